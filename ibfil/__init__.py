@@ -1,0 +1,56 @@
+"""ibfil: elastic filaments in viscous fluids.
+
+From Python, ``ibfil.run("case.toml")`` does what ``ibfil run case.toml`` does. The names below are looked up
+when they are first used, so that ``import ibfil`` and the command line's help cost nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .case import Case, parse_case, read_case
+    from .errors import CaseError, Interrupted, RunFailed
+    from .record import RunFile
+    from .running import run
+    from .simulation import Simulation
+    from .vtk import write_vtk
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Case": "case",
+    "parse_case": "case",
+    "read_case": "case",
+    "CaseError": "errors",
+    "Interrupted": "errors",
+    "RunFailed": "errors",
+    "RunFile": "record",
+    "run": "running",
+    "Simulation": "simulation",
+    "write_vtk": "vtk",
+}
+
+__all__ = [
+    "Case",
+    "CaseError",
+    "Interrupted",
+    "RunFailed",
+    "RunFile",
+    "Simulation",
+    "__version__",
+    "parse_case",
+    "read_case",
+    "run",
+    "write_vtk",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the module of a public name when the name is first used."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'ibfil' has no attribute '{name}'")
+    value = getattr(importlib.import_module(f"ibfil.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

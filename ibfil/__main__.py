@@ -1,0 +1,7 @@
+"""``python -m ibfil`` is the command ``ibfil``."""
+
+import sys
+
+from ibfil.cli import main
+
+sys.exit(main())

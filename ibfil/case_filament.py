@@ -1,0 +1,259 @@
+"""The tables of a filament in a case file: each key with its default and its meaning."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field
+
+from .case_values import (
+    Count,
+    Formula,
+    Listed,
+    NotNegative,
+    Number,
+    OfS,
+    OfST,
+    OfT,
+    PairST,
+    Positive,
+    Range,
+    Real,
+    Seed,
+    TripleS,
+    TripleST,
+    TripleSTXYZ,
+    TripleT,
+    Vector,
+    Whole,
+    by_kind,
+    tagged,
+)
+from .expressions import Expression, parse
+
+ZERO = parse(0)
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+class Table(BaseModel):
+    """A table of the file: no other keys, nothing converted that is not said to be."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Linear(Table):
+    """M = A (O - kappa), the paper's Eq. 4."""
+
+    kind: Literal["linear"] = Field("linear", description="moment proportional to the strain's excess")
+
+
+class Stiffening(Table):
+    """A moment that grows faster than the strain."""
+
+    kind: Literal["stiffening"] = Field("stiffening", description="moment grows faster than the strain")
+    coefficient: Real = Field(description="size of the added term", examples=[1.0])
+    exponent: Positive = Field(description="power of the added term", examples=[3.0])
+
+
+class TwoWell(Table):
+    """Two preferred strains with a barrier between them."""
+
+    kind: Literal["two-well"] = Field("two-well", description="two preferred strains")
+    wells: Range = Field(description="the two preferred strains", examples=[[-1.0, 1.0]])
+    barrier: Positive = Field(description="energy per length between the wells", examples=[1.0])
+    gradient: NotNegative = Field(description="energy of a change of well along s", examples=[0.1])
+
+
+Law = Annotated[
+    Annotated[Linear, tagged("linear")]
+    | Annotated[Stiffening, tagged("stiffening")]
+    | Annotated[TwoWell, tagged("two-well")],
+    by_kind("linear", "linear", "stiffening", "two-well"),
+]
+
+
+class Noise(Table):
+    """A smooth random displacement of the start shape."""
+
+    amplitude: Positive = Field(description="size of the displacement", examples=[1e-3])
+    modes: Count = Field(8, description="number of smooth modes")
+    seed: Seed = Field(1, description="seed of the random numbers")
+
+
+class Shape(Table):
+    """What all start shapes have."""
+
+    perturb: TripleS = Field((ZERO, ZERO, ZERO), description="added to r in the lab frame after placing")
+    twist: OfS = Field(ZERO, description="Omega3 added to the shape's own, by turning e1 about e3")
+    noise: Noise | None = Field(None, description="smooth random perturbation, zero at held ends")
+
+
+class Straight(Shape):
+    """A straight rod."""
+
+    kind: Literal["straight"] = Field("straight", description="a straight rod")
+
+
+class Relaxed(Shape):
+    """The curve of curvature and twist_rate at t = 0."""
+
+    kind: Literal["relaxed"] = Field("relaxed", description="integrates curvature and twist_rate at t = 0")
+
+
+class Helix(Shape):
+    """A helix by radius and pitch, or by curvature and torsion."""
+
+    kind: Literal["helix"] = Field("helix", description="a helix, by radius and pitch or curvature and torsion")
+    radius: Positive | None = Field(None, description="radius of the helix")
+    pitch: NotNegative | None = Field(None, description="advance along the axis in one turn")
+    curvature: Positive | None = Field(None, description="curvature of the helix")
+    torsion: NotNegative | None = Field(None, description="torsion of the helix, its size")
+    hand: Literal["right", "left"] = Field("right", description="right- or left-handed")
+
+
+class Circle(Shape):
+    """An open arc."""
+
+    kind: Literal["circle"] = Field("circle", description="an open arc of a circle, at most one turn")
+    curvature: Real = Field(description="1/radius of the arc", examples=[0.0])
+
+
+class ExpressionShape(Shape):
+    """A curve given by three expressions."""
+
+    kind: Literal["expression"] = Field("expression", description="a curve given by three expressions")
+    r: TripleS = Field(description="position", examples=[["s", 0, 0]])
+
+
+class FileShape(Shape):
+    """Nodes read from a file."""
+
+    kind: Literal["file"] = Field("file", description="points read from a file")
+    path: str = Field(description="csv or npy: x, y, z[, e1x, e1y, e1z], relative to the case", examples=["points.csv"])
+
+
+class RunShape(Shape):
+    """The shape a filament had in another run."""
+
+    kind: Literal["run"] = Field("run", description="the shape of another run")
+    path: str = Field(description="the run file, relative to the case", examples=["run.h5"])
+    time: Annotated[float | Literal["last"], Number(("last",), low=0, open=False)] = Field(
+        "last", description="the time of that run to start from"
+    )
+
+
+AnyShape = Annotated[
+    Annotated[Straight, tagged("straight")]
+    | Annotated[Relaxed, tagged("relaxed")]
+    | Annotated[Helix, tagged("helix")]
+    | Annotated[Circle, tagged("circle")]
+    | Annotated[ExpressionShape, tagged("expression")]
+    | Annotated[FileShape, tagged("file")]
+    | Annotated[RunShape, tagged("run")],
+    by_kind("straight", "straight", "relaxed", "helix", "circle", "expression", "file", "run"),
+]
+
+
+class Spring(Table):
+    """A tether of one end."""
+
+    stiffness: NotNegative = Field(description="force per displacement", examples=[1.0])
+    to: Vector = Field(ORIGIN, description="the point it pulls to")
+
+
+class End(Table):
+    """One end of a filament."""
+
+    end: Literal["free", "hinged", "clamped"] = Field(
+        "free", description="free (M = 0), hinged (r held, M = 0) or clamped (r, e3 held)"
+    )
+    twist: Literal["held", "free"] = Field(
+        "free", description="clamped only: e1 held or free; held by default at a clamped end"
+    )
+    spin: OfT | None = Field(None, description="clamped, twist held: rate of e1 about e3, rad/time")
+    angle: OfT | None = Field(None, description="the same as an angle, rad, instead of spin")
+    tangent: Vector | None = Field(None, description="clamped: e3; absent: the start shape's")
+    moves: TripleT | None = Field(None, description="held ends: displacement of the held point")
+    force: TripleT | None = Field(None, description="external force on the end, lab frame")
+    follower: OfT | None = Field(None, description="external force along +e3; at finish negative compresses")
+    moment: TripleT | None = Field(None, description="external moment")
+    frame: Literal["lab", "body"] = Field("lab", description="axes of moment: lab, or along e1, e2, e3")
+    spring: Spring | None = Field(None, description="tether of this end")
+
+    @property
+    def held(self) -> bool:
+        """Whether the end's position is given."""
+        return self.end != "free"
+
+
+class Tether(Table):
+    """Springs along the whole filament."""
+
+    stiffness: NotNegative = Field(description="force per length per displacement", examples=[1.0])
+    to: Annotated[
+        Annotated[Literal["initial"], tagged("word")] | Annotated[TripleST, tagged("list")],
+        Discriminator(lambda value: "<list>" if isinstance(value, list) else "<word>"),
+    ] = Field("initial", description="the shape it pulls to")
+
+
+class Loads(Table):
+    """Loads per length along the filament."""
+
+    force: TripleSTXYZ | None = Field(None, description="force per length, lab frame")
+    body_force: TripleST | None = Field(None, description="force per length along e1, e2, e3")
+    moment: TripleST | None = Field(
+        None, description="active moment per length along e1, e2, e3; enters e3 x m and Eq. 36"
+    )
+    internal_moment: PairST | None = Field(None, description="added to M1, M2 as -A kappa is (Sec. 7.2)")
+    weight: Vector | None = Field(None, description="constant force per length, lab frame")
+    tether: Tether | None = Field(None, description="springs per length to a shape")
+
+
+class Copies(Table):
+    """The same filament in many places."""
+
+    count: Count | None = Field(None, description="how many, placed at random in region")
+    seed: Seed = Field(1, description="seed of the random places")
+    region: Annotated[tuple[Vector, Vector], Listed(2)] | None = Field(
+        None, description="two corners of the box they are placed in"
+    )
+    orientation: Literal["random"] = Field("random", description="how they are turned")
+    file: str | None = Field(None, description="csv of the places, instead of count and region")
+
+
+class Filament(Table):
+    """One elastic rod."""
+
+    length: Positive = Field(description="rest length L", examples=[1.0])
+    nodes: Annotated[int, Whole(low=5)] = Field(
+        description="number of nodes, at least 8 with derivative 6 and 5 with 2", examples=[41]
+    )
+    spacing: Annotated[Expression | Literal["even"], Formula(("even",), ("q",))] = Field(
+        "even", description="s/L of the nodes for q from 0 to 1, increasing"
+    )
+    derivative: Annotated[int, Whole(choices=(2, 6))] = Field(
+        6, description="order of the stencils of r', r''; 2 by default where [thermal] stands"
+    )
+    force: Literal["eq44", "torque-free"] = Field("eq44", description="discrete force: Eq. 44 or torque-free")
+    bending: Annotated[tuple[OfS, OfS], Listed(2, repeat=True)] = Field(
+        description="bending moduli A, or [A1, A2], > 0", examples=[1.0]
+    )
+    twisting: OfS | None = Field(None, description="twist modulus C > 0; absent: no twist, planar scenes only")
+    stretching: OfS = Field(description="axial stiffness EA > 0, a force (the paper's sigma0)", examples=[1e4])
+    radius: OfS | None = Field(None, description="material radius > 0; required with twisting unless drag gives spin")
+    law: Law = Field(Linear(), description="moment against strain")
+    curvature: PairST = Field((ZERO, ZERO), description="preferred curvatures kappa1, kappa2")
+    twist_rate: OfST = Field(ZERO, description="preferred twist tau0")
+    position: Vector = Field(ORIGIN, description="where anchor stands; the box is centred on the origin")
+    anchor: Literal["start", "middle", "centroid"] = Field("middle", description="the point put at position")
+    direction: Vector = Field((1.0, 0.0, 0.0), description="where align points")
+    align: Literal["auto", "axis", "tangent", "chord"] = Field(
+        "auto",
+        description="what points along direction; auto: axis for helix and relaxed, else tangent (e3(0))",
+    )
+    normal: Vector = Field((0.0, 0.0, 1.0), description="e1 at s = 0, made normal to e3")
+    copies: Copies | None = Field(None, description="many of them")
+    shape: AnyShape = Field(Straight(), description="shape at t = 0")
+    start: End = Field(End(), description="the end at s = 0")
+    finish: End = Field(End(), description="the end at s = L")
+    loads: Loads | None = Field(None, description="loads per length")

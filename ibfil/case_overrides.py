@@ -1,0 +1,68 @@
+"""KEY=VALUE on the command line: one key of a case replaced, by its dotted path."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from typing import Any, get_origin
+
+from .case_faults import ROOT, Entry, Fault, dotted, members, shown, step_into, unknown_key
+from .expressions import suggestion
+
+FORM = "KEY=VALUE, KEY a dotted path such as fluid.viscosity or stop.0.below"
+
+
+def split(text: str) -> tuple[list[str], Any] | Fault:
+    """The path and the value of ``KEY=VALUE``; what is not TOML is a text, so ``fluid.model=rft`` works."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    path = key.split(".")
+    if not equals or not all(path):
+        return Fault("command line", shown(text), FORM)
+    try:
+        table = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        table = {}
+    return path, table["value"] if set(table) == {"value"} else value
+
+
+def apply(raw: dict[str, Any], path: list[str], value: Any) -> dict[str, Any] | Fault:
+    """The content ``raw`` with the key ``path`` set, making tables the schema knows; or the fault."""
+    changed = copy.deepcopy(raw)
+    entry, table = ROOT, changed
+    for depth, part in enumerate(path):
+        here = (*path[: depth + 1],)
+        if isinstance(table, list):
+            fault = _bad_number(here, table)
+            if fault:
+                return fault
+        elif not isinstance(table, dict):
+            above = dotted(here[:-1])
+            return Fault(dotted(here), f"{above} = {shown(table)}", f"a table there; write {above}={{...}}")
+        inner = step_into(entry, int(part) if isinstance(table, list) else part)
+        if inner is None:
+            return unknown_key(entry, here)
+        if here[0] == "parameters" and depth == 1 and part not in table:
+            return Fault(dotted(here), f"no such parameter{suggestion(part, table)}", ", ".join(table) or "none here")
+        last = depth == len(path) - 1
+        index = int(part) if isinstance(table, list) else part
+        if last:
+            table[index] = value
+        elif isinstance(table, dict):
+            table = table.setdefault(part, _empty(inner))
+        else:
+            table = table[index]
+        entry = inner
+    return changed
+
+
+def _bad_number(path: tuple[str, ...], items: list[Any]) -> Fault | None:
+    """The fault of a list entry that is not there."""
+    if path[-1].isascii() and path[-1].isdigit() and len(path[-1]) < 6 and int(path[-1]) < len(items):
+        return None
+    allowed = f"a number from 0 to {len(items) - 1}" if items else "nothing: there is no such list"
+    return Fault(dotted(path), f"no entry {path[-1]}", allowed)
+
+
+def _empty(entry: Entry) -> Any:
+    """What a table or list that is not in the file starts as."""
+    return [] if all(get_origin(member) is tuple for member in members(entry.hint)) else {}

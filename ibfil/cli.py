@@ -1,0 +1,288 @@
+"""The command ``ibfil``: words to calls, faults to lines and an exit status.
+
+Only the standard library is imported here, so that help is instant and the number of threads can be set
+before numpy is loaded; each command imports what it needs when it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from . import __version__
+from .errors import CaseError, Interrupted, RunFailed
+
+if TYPE_CHECKING:
+    from .case import Case
+    from .loop import Result
+
+DONE, FAILED, BAD_INPUT, CUT = 0, 1, 2, 130
+NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+CHANGES = "KEY=VALUE overrides one key of the case, by its dotted path: fluid.model=rft, stop.0.below=1e-3"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line ``argv`` (default: the program's own); returns the exit status."""
+    arguments = _parse(list(sys.argv[1:] if argv is None else argv))
+    try:
+        status: int = arguments.do(arguments)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        # The reader (`| head`) has gone: what Python still holds for it must not raise again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except CaseError as error:
+        return _say(error.faults, BAD_INPUT)
+    except RunFailed as error:
+        return _say(str(error).splitlines(), FAILED)
+    except (Interrupted, KeyboardInterrupt) as error:
+        return _say(str(error).splitlines() or ["interrupted"], CUT)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _say([f"{where}{error.strerror or error}"], FAILED if error.errno in NO_ROOM else BAD_INPUT)
+
+
+def _say(faults: Sequence[str], status: int) -> int:
+    """Faults to standard error, one line each."""
+    for fault in faults:
+        print(f"ibfil: {fault}", file=sys.stderr)
+    return status
+
+
+def _parse(argv: list[str]) -> argparse.Namespace:
+    """Parse; words after an option (`run CASE -o OUT KEY=VALUE`) belong to the command's words too."""
+    parser = _parser()
+    arguments, rest = parser.parse_known_args(argv)
+    unknown = [word for word in rest if word.startswith("-") or not hasattr(arguments, "words")]
+    if unknown:
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    if rest:
+        arguments.words = [*arguments.words, *rest]
+    return arguments
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="ibfil",
+        description="Elastic filaments in viscous fluids: bending, twisting rods in resistive-force theory "
+        "or in an immersed-boundary grid fluid. A case is one TOML file, a run one HDF5 file.",
+        epilog="Exit status: 0 done, 1 the run failed, 2 bad input, 130 after Ctrl-C.",
+    )
+    parser.add_argument("--version", action="version", version=f"ibfil {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def add(name: str, do: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text, epilog=None)
+        command.set_defaults(do=do)
+        return command
+
+    run = add("run", _run, "run a case: a file, or the name of a shipped case")
+    run.epilog = CHANGES
+    run.add_argument("words", nargs="*", metavar="CASE [KEY=VALUE ...]", help="the case, and changes to it")
+    run.add_argument("-o", dest="output", metavar="RUN.h5", help="the run file (default: the case's name, here)")
+    run.add_argument("--force", action="store_true", help="replace a run file that is there already")
+    run.add_argument("--resume", metavar="RUN.h5", help="go on from the last checkpoint of this run")
+    check = add("check", _check, "run nothing: what is modelled, sizes, stable steps, estimated time, warnings")
+    check.epilog = CHANGES
+    check.add_argument("words", nargs="+", metavar="CASE [KEY=VALUE ...]", help="the case, and changes to it")
+    new = add("new", _new, "copy a shipped case to a file, to edit it")
+    new.add_argument("name", metavar="NAME", help="a shipped case (`ibfil cases` lists them)")
+    new.add_argument("file", metavar="FILE", help="the file to make; one that is there is not replaced")
+    add("cases", _cases, "list the shipped cases")
+    schema = add("schema", _schema, "print every table and key of a case")
+    schema.add_argument("--json", action="store_true", help="as JSON Schema")
+    show = add("show", _show, "what is in a run: case, versions, summary, observables")
+    show.add_argument("run", metavar="RUN.h5")
+    show.add_argument("--json", action="store_true", help="the summary as JSON")
+    show.add_argument("--plot", metavar="FILE.png", help="draw the run (png, pdf or svg)")
+    show.add_argument("--csv", metavar="FILE.csv", help="write time and all observables as a table")
+    vtk = add("vtk", _vtk, "write ParaView files: a .pvd collection of filaments and fields")
+    vtk.add_argument("run", metavar="RUN.h5")
+    vtk.add_argument("-o", dest="folder", metavar="DIR", help="the folder (default: the run's name)")
+    verify = add("verify", _verify, "run shipped or given cases and hold their [expect] numbers against the result")
+    verify.add_argument("cases", nargs="*", metavar="CASE")
+    verify.add_argument("--quick", action="store_true", help="the quick form of each case")
+    bench = add("bench", _bench, "time the pieces of a step against floors measured in the same run")
+    bench.add_argument("--json", action="store_true", help="as JSON")
+    return parser
+
+
+def _read(words: Sequence[str]) -> Case:
+    """The case with its overrides; sets the number of threads, which libraries read once, when they load."""
+    from .case import read_case
+    from .shipped import find
+
+    name, *changes = words
+    _only_changes(changes)
+    case = read_case(find(name), changes)
+    set_threads(case.compute.threads)
+    return case
+
+
+def _only_changes(words: Sequence[str]) -> None:
+    stray = [f"{word}: found a word; allowed: KEY=VALUE" for word in words if "=" not in word]
+    if stray:
+        raise CaseError(stray)
+
+
+def set_threads(threads: int) -> None:
+    """Give numpy's and numexpr's libraries this many threads. Has effect only before numpy is imported."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_MAX_THREADS"):
+        os.environ[name] = str(threads)
+    os.environ["OMP_WAIT_POLICY"] = "passive"
+
+
+def _say_if_cold() -> None:
+    """Say so where numba has yet to compile; its caches are where it looks for them itself."""
+    from platformdirs import user_cache_path
+
+    cache = os.environ.get("NUMBA_CACHE_DIR") or user_cache_path("numba", appauthor=False)
+    if not any((Path(__file__).parent / "__pycache__").glob("*.nbi")) and not any(Path(cache).glob("ibfil_*/*.nbi")):
+        print("compiling the numerical kernels, once: half a minute or so", file=sys.stderr, flush=True)
+
+
+def _log(line: str) -> None:
+    print(line, flush=True)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    words = arguments.words
+    if arguments.resume:
+        return _resume(arguments)
+    if not words:
+        raise CaseError(["run: found no case; allowed: CASE [KEY=VALUE ...], or --resume RUN.h5"])
+    case = _read(words)
+    output = Path(arguments.output or Path(words[0]).with_suffix(".h5").name)
+    if not output.parent.is_dir():
+        raise CaseError([f"{output}: there is no folder {output.parent}"])
+    _say_if_cold()
+    from .running import run
+
+    return _end(run(case, output, overwrite=arguments.force, log=_log))
+
+
+def _resume(arguments: argparse.Namespace) -> int:
+    """Go on with a run; its number of threads is needed before the libraries that can read it are loaded."""
+    if arguments.output or arguments.force:
+        raise CaseError(["run --resume: found -o or --force; allowed: neither, it goes on in the same file"])
+    words = arguments.words
+    with_case = bool(words) and ("=" not in words[0] or Path(words[0]).is_file())
+    case = _read(words) if with_case else None
+    if case is None:
+        _only_changes(words)
+        set_threads(_threads_of(arguments.resume))
+    _say_if_cold()
+    from .running import resume_run
+
+    return _end(resume_run(arguments.resume, case, () if with_case else words, log=_log))
+
+
+def _threads_of(run: str) -> int:
+    """The threads of a run's case, read by another process; 1 where it cannot be read, to fail later."""
+    code = (
+        "import sys, pathlib; from ibfil import case, checkpoint, record; "
+        "c = checkpoint.read(record.checkpoint_path(pathlib.Path(sys.argv[1]))); "
+        "print(case.parse_case(c.case, c.file).compute.threads)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code, run], capture_output=True, text=True, check=False)
+    return int(answer.stdout) if answer.returncode == 0 else 1
+
+
+def _end(result: Result) -> int:
+    """What a run ends with: the file, how it ended, the observables, and what was expected of them."""
+    from .record import RunFile
+    from .show import digest, duration, results
+
+    assert result.path is not None
+    with RunFile(result.path) as run:
+        told = digest(run)
+    reason = f" ({told['reason']})" if told["reason"] else ""
+    print(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
+    print(f"{result.path}: {told['outputs']} outputs")
+    print(results(told))
+    return DONE
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    case = _read(arguments.words)
+    from .report import report
+
+    print(report(case))
+    return DONE
+
+
+def _new(arguments: argparse.Namespace) -> int:
+    from . import shipped
+
+    print(f"{arguments.name} -> {shipped.copy(arguments.name, arguments.file)}")
+    return DONE
+
+
+def _cases(arguments: argparse.Namespace) -> int:
+    from .shipped import listing
+
+    rows = listing()
+    width = max((len(row.name) for row in rows), default=0)
+    group = None
+    for row in rows:
+        if row.group != group:
+            group = row.group
+            print(f"{group}/")
+        print(f"  {row.name:{width}}  {row.title}")
+        print(f"  {'':{width}}    {row.source}")
+    return DONE
+
+
+def _schema(arguments: argparse.Namespace) -> int:
+    import json
+
+    from .case_listing import schema_json, schema_text
+
+    print(json.dumps(schema_json(), indent=2) if arguments.json else schema_text())
+    return DONE
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    from . import show
+    from .record import RunFile
+
+    with RunFile(arguments.run) as run:
+        told = show.digest(run)
+        print(show.as_json(told) if arguments.json else show.as_text(told))
+        if arguments.csv:
+            show.write_csv(run, arguments.csv)
+        if arguments.plot:
+            from .figure import draw
+
+            draw(run, arguments.plot)
+    return DONE
+
+
+def _vtk(arguments: argparse.Namespace) -> int:
+    from .vtk import write_vtk
+
+    print(f"open {write_vtk(arguments.run, arguments.folder)} in ParaView")
+    return DONE
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    set_threads(1)
+    _say_if_cold()
+    from .verify import verify
+
+    return verify(arguments.cases, arguments.quick, _log)
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    set_threads(1)
+    from . import bench
+
+    bench.main(json=arguments.json)
+    return DONE

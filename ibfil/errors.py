@@ -1,0 +1,47 @@
+"""The ways in which ibfil says no: a bad case, a failed run, an interrupted run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class CaseError(Exception):
+    """A case file that cannot be run. ``faults`` holds one line for each thing found wrong (exit status 2)."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("\n".join(faults))
+        self.faults = list(faults)
+
+
+class RunFailed(Exception):
+    """A run that had to stop (exit status 1).
+
+    ``time`` is in the case's unit of time, ``node`` counts from 0 at ``start``, ``advice`` says what to change.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        time: float | None = None,
+        filament: str | None = None,
+        node: int | None = None,
+        advice: str = "",
+    ) -> None:
+        super().__init__(message)
+        self.message, self.time, self.filament, self.node, self.advice = message, time, filament, node, advice
+
+    def __str__(self) -> str:
+        """What, when, where, and what to change, in one line each."""
+        where = ""
+        if self.filament is not None:
+            where = f" on filament {self.filament}" + ("" if self.node is None else f", node {self.node}")
+        when = "" if self.time is None else f" at t = {self.time:.6g}"
+        lines = [f"the run stopped{when}{where}: {self.message}"]
+        if self.advice:
+            lines.append(f"what to change: {self.advice}")
+        return "\n".join(lines)
+
+
+class Interrupted(Exception):
+    """Ctrl-C or SIGTERM, raised between two steps (exit status 130)."""

@@ -1,0 +1,91 @@
+"""Fields on the grid for output: one evaluation of the fluid, whatever is asked of it.
+
+From the modes f of the spread forces:  u = (eta k^2)^-1 (1 - k k/|k|^2) f,  omega = i k x u,  p = -i k.f/|k|^2.
+The pressure is that of the rods' disturbance, without the uniform gradient that carries a net force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .grid import Grid, project, spread
+from .transforms import VectorTransform
+
+Flow = Callable[[np.ndarray, float], np.ndarray]
+
+
+class GridFields:
+    """Evaluates velocity, vorticity (nx, ny, nz, 3) and pressure (nx, ny, nz), all single precision."""
+
+    def __init__(self, grid: Grid, viscosity: float, flow: Flow | None, threads: int = 1) -> None:
+        self.grid, self.viscosity, self.flow = grid, viscosity, flow
+        nx, ny, nz = (int(n) for n in grid.cells)
+        self._transform = VectorTransform((nx, ny, nz), threads, "FFTW_ESTIMATE")
+        (kx, ky, kz), self._squares = grid.wave_numbers()
+        self._k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
+        self._waves = (kx, ky, np.repeat(kz, 2))
+
+    def evaluate(
+        self, base: np.ndarray, weights: np.ndarray, force: np.ndarray, time: float, names: Sequence[str]
+    ) -> dict[str, np.ndarray]:
+        """The fields in ``names`` that nodal forces (n, 3) with the stencils (base, weights) drive."""
+        t, h = self._transform, self.grid.spacing
+        t.real[:] = 0.0
+        spread(base, weights, force, t.real)
+        t.forward()
+        t.modes /= t.size * h**3
+        out = {}
+        if "pressure" in names:
+            out["pressure"] = self._pressure(t.modes.copy())
+        sx, sy, sz = self._squares
+        project(t.modes.view(float), *self._waves, sx, sy, np.repeat(sz, 2), 0.0, self.viscosity, 1.0)
+        modes = t.modes.copy()
+        if "velocity" in names:
+            out["velocity"] = self._real(modes, self._background(time))
+        if "vorticity" in names:
+            curl = np.stack(
+                [1j * (self._k[a] * modes[b] - self._k[b] * modes[a]) for a, b in ((1, 2), (2, 0), (0, 1))]
+            )
+            out["vorticity"] = self._real(curl, self._background_curl(time))
+        return out
+
+    def _real(self, modes: np.ndarray, background: np.ndarray | None) -> np.ndarray:
+        self._transform.modes[:] = modes
+        real = np.moveaxis(self._transform.backward(), 0, -1)
+        return (real if background is None else real + background).astype(np.float32)
+
+    def _pressure(self, force: np.ndarray) -> np.ndarray:
+        k = self._k
+        square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
+        square[square == 0] = np.inf
+        modes = np.zeros_like(force)
+        modes[0] = -1j * (k[0] * force[0] + k[1] * force[1] + k[2] * force[2]) / square
+        return np.ascontiguousarray(self._real(modes, None)[..., 0])
+
+    def _points(self) -> np.ndarray:
+        """Places (nx ny nz, 3) of the grid points."""
+        axes = [
+            origin + self.grid.spacing * np.arange(n) for origin, n in zip(self.grid.origin, self.grid.cells, strict=True)
+        ]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def _background(self, time: float) -> np.ndarray | None:
+        if self.flow is None:
+            return None
+        return self.flow(self._points(), time).reshape(*self.grid.cells, 3)
+
+    def _background_curl(self, time: float) -> np.ndarray | None:
+        """Curl of the background flow by central differences over a thousandth of a cell."""
+        if self.flow is None:
+            return None
+        points, d = self._points(), 1e-3 * self.grid.spacing
+        slopes = []
+        for axis in range(3):
+            step = np.zeros(3)
+            step[axis] = d
+            slopes.append((self.flow(points + step, time) - self.flow(points - step, time)) / (2 * d))
+        x, y, z = slopes
+        curl = np.stack([y[:, 2] - z[:, 1], z[:, 0] - x[:, 2], x[:, 1] - y[:, 0]], axis=1)
+        return curl.reshape(*self.grid.cells, 3)

@@ -1,0 +1,53 @@
+"""The contract between rods and fluids: over one step, at frozen positions, every fluid is u = u0 + M F.
+
+The stepper decides what to ask (an explicit move, or one Newton iteration with the stiffness K of the forces); the
+fluid decides how to answer (drag on the left, a dense table, Krylov on FFTs). Neither imports the other.
+
+Unknowns are the displacements y (n, m) of the nodes since the start of the step: three components, and where the
+rods twist (m = 4) the angle by which e1 turned about the tangent. Forces are (n, m) likewise: a force, and a torque
+about the tangent. All first and second order schemes are one statement,
+
+    y = target + tau (u0 + M (f(y) + R)),       y = prescribed at held unknowns, where the reaction R acts
+
+so held nodes are data, and the reaction on a support comes out of the solve.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+
+class Held(NamedTuple):
+    """The unknowns that are prescribed over a step: flat indices node * m + component (k,), and their y (k,)."""
+
+    at: np.ndarray
+    value: np.ndarray
+
+
+class Answer(NamedTuple):
+    """What a fluid returns, each (n, m): the move, the force the fluid felt, and what of it the supports gave."""
+
+    move: np.ndarray
+    force: np.ndarray  # elastic force and loads as they acted over the step, reactions included
+    reaction: np.ndarray  # of the supports on the rod, zero where nothing is held
+
+
+class Response(Protocol):
+    """A fluid at frozen positions, over a step whose effective length is tau (units of time)."""
+
+    def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
+        """The displacements y = target + tau (u0 + M (force + R)); no stiffness."""
+
+    def implicit(
+        self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
+    ) -> Answer:
+        """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K a band matrix by node."""
+
+
+class Fluid(Protocol):
+    """A model of the fluid: turns a configuration into its response."""
+
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> Response:
+        """The response at nodes r (n, 3) with unit tangents e3 (n, 3); flows and histories are those of ``time``."""

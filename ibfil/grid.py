@@ -1,0 +1,135 @@
+"""The periodic grid: where its points are, its wave numbers, and the Stokes solve by FFT.
+
+Points lie at x_j = (j - n // 2) h on each axis, so the box is centred on the origin and a grid point is at the
+origin. Positions are unwrapped; indices are taken modulo the number of cells.
+
+The solve, mode by mode:  u = (alpha + eta k^2)^-1 (1 - k k/|k|^2) f.  At the Nyquist wave number of an even axis the
+derivative's k is zero (a real field has none there) while k^2 keeps its value: zeroing both costs 4.7 % in the
+self-mobility of a 3-point kernel. The mean mode is zero: a uniform back pressure carries any net force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+
+class Grid:
+    """A periodic box (3,) of cubic cells: ``cells`` (3,), ``spacing`` h, ``origin`` of grid index (0, 0, 0)."""
+
+    def __init__(self, box: Sequence[float], cells: Sequence[int]) -> None:
+        self.cells = np.array(cells, np.int64)
+        self.box = np.array(box, float)
+        self.spacing = float(self.box[0] / self.cells[0])
+        self.origin = -(self.cells // 2) * self.spacing
+
+    def coordinates(self, r: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) in units of the spacing, from grid index (0, 0, 0)."""
+        return r / self.spacing + self.cells // 2
+
+    def wave_numbers(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """For each axis the wave numbers of derivatives, and the true k^2; the last axis is halved (real fields)."""
+        ks, squares = [], []
+        for axis, n in enumerate(self.cells):
+            frequencies = np.fft.rfftfreq if axis == 2 else np.fft.fftfreq
+            k = 2 * np.pi * frequencies(int(n), self.spacing)
+            squares.append(k * k)
+            if n % 2 == 0:
+                k = k.copy()
+                k[n // 2] = 0.0
+            ks.append(k)
+        return ks, squares
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def project(modes, kx, ky, kz, sx, sy, sz, alpha, viscosity, scale):
+    """In place: scale (alpha + eta k^2)^-1 (1 - k k/|k|^2), with the mean mode zero.
+
+    ``modes`` (3, nx, ny, 2 (nz//2 + 1)) are complex modes seen as pairs of reals, and so ``kz``, ``sz`` come twice
+    each: the multipliers are real, and the loop over plain reals is what compilers turn into vector code.
+    """
+    nx, ny, nz = modes.shape[1:]
+    for i in range(nx):
+        for j in range(ny):
+            a, b = kx[i], ky[j]
+            s, d = alpha + viscosity * (sx[i] + sy[j]), a * a + b * b
+            u, v, w = modes[0, i, j], modes[1, i, j], modes[2, i, j]
+            if s == 0.0 or d == 0.0:  # some k may be zero here: guard the divisions
+                for k in range(nz):
+                    c = kz[k]
+                    square, total = d + c * c, s + viscosity * sz[k]
+                    f = scale / total if total != 0.0 else 0.0
+                    p = (a * u[k] + b * v[k] + c * w[k]) / square if square != 0.0 else 0.0
+                    u[k] = f * (u[k] - a * p)
+                    v[k] = f * (v[k] - b * p)
+                    w[k] = f * (w[k] - c * p)
+            else:
+                for k in range(nz):
+                    c = kz[k]
+                    f = scale / (s + viscosity * sz[k])
+                    p = (a * u[k] + b * v[k] + c * w[k]) / (d + c * c)
+                    u[k] = f * (u[k] - a * p)
+                    v[k] = f * (v[k] - b * p)
+                    w[k] = f * (w[k] - c * p)
+    for c in range(3):
+        modes[c, 0, 0, 0] = 0.0
+        modes[c, 0, 0, 1] = 0.0
+
+
+@njit(cache=True)
+def spread(base, weights, force, field):
+    """Adds force (n, 3) to field (3, nx, ny, nz) with the weights; divide by the cell's volume for a density."""
+    n, _, p = weights.shape
+    nx, ny, nz = field.shape[1:]
+    for q in range(n):
+        for i in range(p):
+            x = (base[q, 0] + i) % nx
+            for j in range(p):
+                y = (base[q, 1] + j) % ny
+                w = weights[q, 0, i] * weights[q, 1, j]
+                for k in range(p):
+                    z = (base[q, 2] + k) % nz
+                    v = w * weights[q, 2, k]
+                    field[0, x, y, z] += v * force[q, 0]
+                    field[1, x, y, z] += v * force[q, 1]
+                    field[2, x, y, z] += v * force[q, 2]
+
+
+@njit(cache=True)
+def clear(base, points, field):
+    """Zeros field where ``spread`` wrote: cheaper than clearing the whole grid."""
+    n = base.shape[0]
+    nx, ny, nz = field.shape[1:]
+    for q in range(n):
+        for i in range(points):
+            x = (base[q, 0] + i) % nx
+            for j in range(points):
+                y = (base[q, 1] + j) % ny
+                for k in range(points):
+                    z = (base[q, 2] + k) % nz
+                    field[0, x, y, z] = 0.0
+                    field[1, x, y, z] = 0.0
+                    field[2, x, y, z] = 0.0
+
+
+@njit(cache=True)
+def interpolate(base, weights, field):
+    """The values (n, 3) of field (3, nx, ny, nz) at the nodes: the transpose of ``spread``."""
+    n, _, p = weights.shape
+    nx, ny, nz = field.shape[1:]
+    out = np.zeros((n, 3))
+    for q in range(n):
+        for i in range(p):
+            x = (base[q, 0] + i) % nx
+            for j in range(p):
+                y = (base[q, 1] + j) % ny
+                w = weights[q, 0, i] * weights[q, 1, j]
+                for k in range(p):
+                    z = (base[q, 2] + k) % nz
+                    v = w * weights[q, 2, k]
+                    out[q, 0] += v * field[0, x, y, z]
+                    out[q, 1] += v * field[1, x, y, z]
+                    out[q, 2] += v * field[2, x, y, z]
+    return out

@@ -1,0 +1,127 @@
+"""The dimensionless groups of a scene, and what in it should make its user look twice."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import shapes, timescales
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+NEAR = 0.8  # ds/h below which a nearly inextensible rod locks without slip (numerics.md, 4.3)
+CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the motion
+FINE = 0.3  # omega dt up to which the default scheme was measured to be accurate
+
+
+def _softest(filament) -> float:
+    s = np.linspace(0.0, filament.length, 11)
+    return min(float(np.min(a.bind("s", "t")(s, 0.0))) for a in filament.bending)
+
+
+def _rod(simulation: Simulation, filament) -> dict[str, float]:
+    """Groups of one filament."""
+    case, grid = simulation.case, simulation.grid
+    bending, length = _softest(filament), filament.length
+    out: dict[str, float] = {}
+    rate = max(simulation.driving_rates(), default=0.0)
+    if rate:
+        out["sperm number"] = length * (simulation.drag(filament) * rate / bending) ** 0.25
+        out["omega dt"] = rate * simulation.step_length
+    stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
+    out["EA L^2/A"] = stretching * length**2 / bending
+    if grid is not None:
+        from .kernels import KERNELS
+
+        out["ds/h"] = length / (filament.nodes - 1) / grid.spacing
+        out["a/L"] = KERNELS[case.fluid.kernel].line_radius * grid.spacing / length
+        wave = _wave(filament)
+        if wave:
+            out["wavelength/h"] = 2 * np.pi / wave / grid.spacing
+    elif filament.radius is not None:
+        out["a/L"] = float(np.max(filament.radius.bind("s", "t")(0.5 * length, 0.0))) / length
+    return out
+
+
+def _wave(filament) -> float:
+    """Largest wave number of the preferred curvatures at t = 0; zero where they are constant."""
+    s = np.array([0.0, filament.length])
+    waves = [0.0]
+    for curvature in filament.curvature:
+        if "s" in curvature.variables:
+            value = curvature.bind("s", "t")
+            waves.append(timescales.wave_number(lambda x, v=value: v(x, 0.0), s))  # type: ignore[misc]
+    return max(waves)
+
+
+def groups(simulation: Simulation) -> dict[str, float]:
+    """The dimensionless groups of the scene; with several filaments each name begins with the filament's."""
+    filaments = simulation.case.filaments
+    out: dict[str, float] = {}
+    for name, filament in filaments.items():
+        prefix = "" if len(filaments) == 1 else f"{name}: "
+        out.update({prefix + key: value for key, value in _rod(simulation, filament).items()})
+    return out
+
+
+def warnings(simulation: Simulation) -> list[str]:
+    """One sentence for each thing that runs but may not mean what its user thinks."""
+    case, out = simulation.case, []
+    for name, filament in case.filaments.items():
+        key = f"filament.{name}"
+        found = _rod(simulation, filament)
+        if found.get("ds/h", 1.0) < NEAR and case.fluid.slip == 0:
+            out.append(
+                f"{key}: nodes are {found['ds/h']:.2g} cells apart and fluid.slip = 0: below {NEAR} a nearly "
+                "inextensible rod locks, and moves wrongly without any sign of trouble; "
+                "set fluid.slip = 0.01, or take fewer nodes or more cells"
+            )
+        if found.get("wavelength/h", np.inf) < CELLS_A_WAVE:
+            out.append(
+                f"{key}: {found['wavelength/h']:.3g} cells a wavelength: below {CELLS_A_WAVE} the rod is as "
+                "thick as its waves; take more fluid.cells"
+            )
+        if simulation.grid is not None and filament.length > min(simulation.grid.box):
+            out.append(
+                f"{key}: length {filament.length:g} is more than the box ({min(simulation.grid.box):g}): the filament "
+                "meets its own periodic images; take a larger fluid.box"
+            )
+        if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * FINE:
+            out.append(
+                f"time.step: omega dt = {found['omega dt']:.3g}; the schemes are accurate up to about {FINE}"
+            )
+        where = simulation.nodes(name)
+        out += shapes.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
+    return out + _of_run(simulation)
+
+
+def _of_run(simulation: Simulation) -> list[str]:
+    case, out = simulation.case, []
+    if case.time.scheme == "explicit" and case.time.step != "auto":
+        limit = simulation.explicit_limit()
+        if case.time.step > limit:
+            out.append(
+                f"time.step: {case.time.step:g} is above the explicit limit {limit:.3g}: this will diverge"
+            )
+    pressure = back_pressure(simulation)
+    if pressure is not None:
+        shown = ", ".join(f"{p:.3g}" for p in pressure)
+        out.append(
+            f"fluid.box: the rods push the fluid with a net force at the start; on a periodic box a uniform back "
+            f"pressure gradient ({shown}) carries it, so that there is no mean flow"
+        )
+    return out
+
+
+def back_pressure(simulation: Simulation) -> np.ndarray | None:
+    """The mean pressure gradient (3,) that a net force on a periodic box implies at the start; None if there is none."""
+    if simulation.grid is None:
+        return None
+    frame = simulation.frame()
+    net = np.asarray(frame.diagnostics["net_force"])
+    scale = sum(float(np.sum(np.abs(f.force))) for f in frame.filaments.values())
+    if np.max(np.abs(net)) <= 1e-9 * scale:
+        return None
+    return net / float(np.prod(simulation.grid.box))

@@ -1,0 +1,215 @@
+"""External forces and moments on the rods. Each is one class: what it adds to the force, and to the stiffness.
+
+All are external and act on the rod; the fluid feels them through it. Forces per length are taken times the control
+volume Lc of each node (Eq. 16 of the paper prints ds, which gives a rod of N nodes N/(N - 1) times the force).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .geometry import Geometry
+from .rods import Mesh
+from .variation import Variation
+
+OfTime = Callable[[float], np.ndarray]
+
+
+def _forces(rows: np.ndarray, unknowns: int) -> np.ndarray:
+    """Rows (k, 3, ...) of forces, with a row of no torque where rods twist."""
+    if unknowns == 3:
+        return rows
+    return np.concatenate([rows, np.zeros_like(rows[:, :1])], axis=1)
+
+
+class Follower:
+    """A force along +e3 of one node, of size ``size(t)``: external, so negative compresses at s = L.
+
+    The paper's Sec. 7.7 has F0 e3 where -F0 e3 is meant: +F0 e3 stretches, and nothing flutters.
+    """
+
+    def __init__(self, node: int, size: Callable[[float], float]) -> None:
+        self.node, self.size = np.array([node]), size
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """f = size e3 on the node."""
+        force[self.node, :3] += self.size(time) * shape.e3[self.node]
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """df = size de3."""
+        variation.tangent(self.node, _forces(self.size(time) * np.eye(3)[None], variation.m))
+
+
+class Dead:
+    """A force given in the lab, ``force(t)`` (k, 3), on the nodes ``nodes`` (k,): an end force, a weight."""
+
+    def __init__(self, nodes: np.ndarray, force: OfTime) -> None:
+        self.nodes, self.force = nodes, force
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """f, whatever the rod does."""
+        force[self.nodes, :3] += self.force(time)
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """Nothing: it does not follow."""
+
+
+class Place:
+    """A force that depends on where the nodes are, ``force(r, t)`` (k, 3) on nodes (k,)."""
+
+    def __init__(self, nodes: np.ndarray, force: Callable[[np.ndarray, float], np.ndarray], reach: float) -> None:
+        """``reach``: the length over which the force is differenced for its stiffness."""
+        self.nodes, self.force, self._h = nodes, force, reach
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """f at the nodes' places."""
+        force[self.nodes, :3] += self.force(shape.r[self.nodes], time)
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """df = (df/dr) dr, by central differences of the expression."""
+        r = variation.shape.r[self.nodes]
+        rows = np.empty((len(r), 3, 3))
+        for c in range(3):
+            step = np.zeros(3)
+            step[c] = self._h
+            rows[:, :, c] = (self.force(r + step, time) - self.force(r - step, time)) / (2 * self._h)
+        variation.position(self.nodes, _forces(rows, variation.m))
+
+
+class Tether:
+    """Springs -k (r - r0) on nodes (k,): ``stiffness`` (k,) a force per length, ``to(t)`` (k, 3)."""
+
+    def __init__(self, nodes: np.ndarray, stiffness: np.ndarray, to: OfTime) -> None:
+        self.nodes, self.stiffness, self.to = nodes, stiffness[:, None], to
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """f = -k (r - r0)."""
+        force[self.nodes, :3] -= self.stiffness * (shape.r[self.nodes] - self.to(time))
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """df = -k dr."""
+        variation.position(self.nodes, _forces(-self.stiffness[:, :, None] * np.eye(3), variation.m))
+
+
+class BodyForce:
+    """A force along the rod's own directors: ``parts(t)`` (k, 3) along e1, e2, e3, on nodes (k,)."""
+
+    def __init__(self, nodes: np.ndarray, parts: OfTime) -> None:
+        self.nodes, self.parts = nodes, parts
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """f = b1 e1 + b2 e2 + b3 e3."""
+        force[self.nodes, :3] += vector(shape, self.nodes, self.parts(time))
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """df = b_a de_a."""
+        rows = np.broadcast_to(np.eye(3), (len(self.nodes), 3, 3))
+        variation.directors(self.nodes, self.parts(time), _forces(rows, variation.m))
+
+
+class ActiveMoment:
+    """A moment per length along e1, e2, e3, ``parts(t)`` (n, 3) at all nodes; zero where there is none.
+
+    It enters the force of Eq. 13 as e3 x m, at half nodes by the mean of the nodes, AND the spin of Eq. 36 as Lc m3.
+    """
+
+    def __init__(self, mesh: Mesh, parts: OfTime) -> None:
+        self.mesh, self.parts = mesh, parts
+        self._nodes = np.arange(len(mesh.ds))
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """Fluxes (q_i + q_{i+1})/2, q = e3 x m = m1 e2 - m2 e1, and the torque Lc m3."""
+        m = self.parts(time)
+        q = m[:, :1] * shape.e2 - m[:, 1:2] * shape.e1
+        flux = np.where(self.mesh.joined[:-1, None], 0.5 * (q[:-1] + q[1:]), 0.0)
+        force[:-1, :3] += flux
+        force[1:, :3] -= flux
+        if force.shape[1] == 4:
+            force[:, 3] += self.mesh.volume * m[:, 2]
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """dq = m1 de2 - m2 de1, into the rows on either side of both segments of a node."""
+        m, joined = self.parts(time), self.mesh.joined
+        crossed = np.column_stack([-m[:, 1], m[:, 0], np.zeros(len(m))])
+        half = 0.5 * np.broadcast_to(np.eye(3), (len(m), 3, 3))
+        right = self._nodes[joined]
+        left = self._nodes[1:][joined[:-1]]
+        for nodes, shift, sign in ((right, 0, 1), (right, 1, -1), (left, -1, 1), (left, 0, -1)):
+            rows = _forces(sign * half[nodes], variation.m)
+            variation.directors(nodes, crossed[nodes], rows, shift)
+
+
+class EndMoment:
+    """A moment m(t) on the end of a rod that is free to turn: M(L) = +m, M(0) = -m (derivations.md, section 2).
+
+    ``parts(t)`` (3,) in the lab, or along e1, e2, e3 where ``body``. The moment at the end node gives the flux beside
+    it Q = e3 x M and P = M1 O1 + M2 O2, and the spin of the node m.e3 and its source.
+    """
+
+    def __init__(self, mesh: Mesh, node: int, finish: bool, parts: Callable[[float], np.ndarray], body: bool) -> None:
+        self.node, self.parts, self.body = np.array([node]), parts, body
+        self.sign = 1.0 if finish else -1.0
+        self.inner = -1 if finish else 1  # where the node beside it is
+        self.half = node - 1 if finish else node
+        self.ds, self.volume = float(mesh.ds[self.half]), float(mesh.volume[node])
+
+    def _moment(self, shape: Geometry, time: float) -> np.ndarray:
+        """M at the node (3,), in the lab."""
+        parts = self.parts(time)
+        given = vector(shape, self.node, parts[None])[0] if self.body else parts
+        return self.sign * given
+
+    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+        """The flux (sign Q - P d/2)/ds between the node and its neighbour, and the torque on the node."""
+        i = int(self.node[0])
+        moment, gap = self._moment(shape, time), shape.gap[self.half]
+        q, p = np.cross(shape.e3[i], moment), moment @ np.cross(shape.e3[i], shape.d2[i])
+        flux = (self.sign * q - 0.5 * p * gap) / self.ds
+        force[i, :3] -= self.sign * flux
+        force[i + self.inner, :3] += self.sign * flux
+        if force.shape[1] == 4:
+            along = moment @ shape.e3[i]
+            # O1 M2 - O2 M1 = -(M.r'' - (M.e3)(e3.r''))
+            source = along * (shape.e3[i] @ shape.d2[i]) - moment @ shape.d2[i]
+            force[i, 3] += self.sign * along + self.volume * source
+
+    def add_stiffness(self, time: float, variation: Variation) -> None:
+        """Of the flux (sign e3 x M - P d/2)/ds and of the torque, through de3, dr'', the gap, and dM where it turns."""
+        shape, i, m = variation.shape, int(self.node[0]), variation.m
+        moment, gap, e3, d2 = self._moment(shape, time), shape.gap[self.half], shape.e3[i], shape.d2[i]
+        # One matrix (4, 3) on each of de3, dr'', dM: three rows of the flux, one of the node's torque.
+        p = moment @ np.cross(e3, d2)
+        on_e3, on_d2, on_m = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((4, 3))
+        on_e3[:3] = (-self.sign * cross_matrix(moment) - 0.5 * np.outer(gap, np.cross(d2, moment))) / self.ds
+        on_d2[:3] = -0.5 * np.outer(gap, np.cross(moment, e3)) / self.ds
+        on_m[:3] = (self.sign * cross_matrix(e3) - 0.5 * np.outer(gap, np.cross(e3, d2))) / self.ds
+        along, bent = moment @ e3, e3 @ d2
+        on_e3[3] = self.sign * moment + self.volume * (moment * bent + along * d2)
+        on_d2[3] = self.volume * (along * e3 - moment)
+        on_m[3] = self.sign * e3 + self.volume * (bent * e3 - d2)
+        here, beside = np.array([-self.sign] * 3 + [1.0])[:m, None], np.array([self.sign] * 3 + [0.0])[:m, None]
+        for factor, shift in ((here, 0), (beside, self.inner)):
+            variation.tangent(self.node, (factor * on_e3[:m])[None], shift)
+            variation.curvature(self.node, (factor * on_d2[:m])[None], shift)
+            if self.body:
+                parts = self.sign * self.parts(time)
+                variation.directors(self.node, parts[None], (factor * on_m[:m])[None], shift)
+            stretch = (factor * np.vstack([-0.5 * p / self.ds * np.eye(3), np.zeros(3)])[:m])[None]
+            right, left = np.array([self.half + 1]), np.array([self.half])
+            row = i + shift
+            variation.position(right, stretch, row - self.half - 1)
+            variation.position(left, -stretch, row - self.half)
+
+
+def vector(shape: Geometry, nodes: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """p1 e1 + p2 e2 + p3 e3 (k, 3) at nodes (k,), from parts (k, 3)."""
+    return (
+        parts[:, :1] * shape.e1[nodes] + parts[:, 1:2] * shape.e2[nodes] + parts[:, 2:] * shape.e3[nodes]
+    )
+
+
+def cross_matrix(v: np.ndarray) -> np.ndarray:
+    """The matrix of v x."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -1,0 +1,136 @@
+"""The exact mobility of nodes on the grid, without the grid (ib_numerics.md, section 1).
+
+Weights of a node are products over the axes, so the velocity that a unit force at node q gives node p is
+
+    M_pq = sum_m c_x[m_x] c_y[m_y] c_z[m_z] G(b_p - b_q + m),    c[m] = sum_{i - j = m} w_p[i] w_q[j]
+
+with G the grid's response to a unit force on one cell. It is the operator J L^-1 S itself, to round-off, and its cost
+does not depend on the number of cells. G is even or odd along each axis, so one octant is stored, with a rim as wide
+as a kernel: a pair is mirrored into the octant instead of each of its terms.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.fft import irfftn
+
+from .grid import Grid
+
+_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
+    """G (6, nx, ny, nz): velocity from a unit force on cell 0, components xx, yy, zz, xy, xz, yz.
+
+    Unit force: density 1/h^3 on that cell. ``alpha`` (density over time) is zero in Stokes flow.
+    """
+    (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
+    k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
+    total = alpha + viscosity * (sx[:, None, None] + sy[None, :, None] + sz[None, None, :])
+    total[0, 0, 0] = np.inf
+    square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
+    square[square == 0] = np.inf
+    out = np.empty((6, *grid.cells))
+    for c, (a, b) in enumerate(_COMPONENTS):
+        symbol = (float(a == b) - k[a] * k[b] / square) / (total * grid.spacing**3)
+        out[c] = irfftn(symbol, s=tuple(grid.cells), axes=(0, 1, 2))
+    return out
+
+
+def octant(response: np.ndarray, points: int) -> np.ndarray:
+    """The octant of G that every pair can be mirrored into, with a rim of points - 1 cells, as (x, y, z and component)."""
+    rim = points - 1
+    axes = [np.arange(-rim, n // 2 + rim + 1) % n for n in response.shape[1:]]
+    cut = response[:, axes[0][:, None, None], axes[1][None, :, None], axes[2][None, None, :]]
+    table = np.ascontiguousarray(np.moveaxis(cut, 0, 3))
+    return table.reshape(*table.shape[:2], -1)
+
+
+@njit(cache=True)
+def _correlate(wp, wq, mirrored, out):
+    """c[m] for one axis, m = -(P-1) .. P-1 from index 0; reversed where the pair is mirrored."""
+    p = wp.shape[0]
+    out[:] = 0.0
+    for i in range(p):
+        for j in range(p):
+            m = j - i if mirrored else i - j
+            out[m + p - 1] += wp[i] * wq[j]
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def _sum(table, x, y, z, c, acc, sums):
+    """sums[component] = sum_m c_x c_y c_z G(corner + m); ``acc`` is room for the sums over the first two axes."""
+    terms = c.shape[1]
+    length, first = 6 * terms, 6 * z
+    acc[:] = 0.0
+    for i in range(terms):
+        for j in range(terms):
+            w = c[0, i] * c[1, j]
+            line = table[x + i, y + j]
+            for k in range(length):
+                acc[k] += w * line[first + k]
+    sums[:] = 0.0
+    for k in range(terms):
+        for a in range(6):
+            sums[a] += c[2, k] * acc[6 * k + a]
+
+
+@njit(cache=True)
+def pairs(table, cells, base, weights, slip, rows, columns):
+    """The mobility (len(rows), 3, len(columns), 3) between nodes, with slip[i] added on the diagonal of node i.
+
+    ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils, ``table`` the octant.
+    """
+    p = weights.shape[2]
+    c, acc, sums, corner = np.empty((3, 2 * p - 1)), np.empty(6 * (2 * p - 1)), np.empty(6), np.empty(3, np.int64)
+    sign = np.empty(3)
+    out = np.empty((rows.size, 3, columns.size, 3))
+    for i in range(rows.size):
+        for j in range(columns.size):
+            a, b = rows[i], columns[j]
+            for axis in range(3):
+                n = cells[axis]
+                d = (base[a, axis] - base[b, axis]) % n
+                mirrored = d > n // 2
+                _correlate(weights[a, axis], weights[b, axis], mirrored, c[axis])
+                corner[axis] = n - d if mirrored else d
+                sign[axis] = -1.0 if mirrored else 1.0
+            _sum(table, corner[0], corner[1], corner[2], c, acc, sums)
+            m = out[i, :, j, :]
+            m[0, 0], m[1, 1], m[2, 2] = sums[0], sums[1], sums[2]
+            m[0, 1] = m[1, 0] = sign[0] * sign[1] * sums[3]
+            m[0, 2] = m[2, 0] = sign[0] * sign[2] * sums[4]
+            m[1, 2] = m[2, 1] = sign[1] * sign[2] * sums[5]
+            if a == b:
+                for axis in range(3):
+                    m[axis, axis] += slip[a]
+    return out
+
+
+@njit(cache=True)
+def mobility(table, cells, base, weights, slip):
+    """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
+    n, p = weights.shape[0], weights.shape[2]
+    c, acc, sums, corner = np.empty((3, 2 * p - 1)), np.empty(6 * (2 * p - 1)), np.empty(6), np.empty(3, np.int64)
+    sign = np.empty(3)
+    out = np.empty((n, 3, n, 3))
+    for a in range(n):
+        for b in range(a, n):
+            for axis in range(3):
+                cell = cells[axis]
+                d = (base[a, axis] - base[b, axis]) % cell
+                mirrored = d > cell // 2
+                _correlate(weights[a, axis], weights[b, axis], mirrored, c[axis])
+                corner[axis] = cell - d if mirrored else d
+                sign[axis] = -1.0 if mirrored else 1.0
+            _sum(table, corner[0], corner[1], corner[2], c, acc, sums)
+            xy, xz, yz = sign[0] * sign[1] * sums[3], sign[0] * sign[2] * sums[4], sign[1] * sign[2] * sums[5]
+            for x in range(3):
+                out[a, x, b, x] = out[b, x, a, x] = sums[x]
+            out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = xy
+            out[a, 0, b, 2] = out[b, 0, a, 2] = out[a, 2, b, 0] = out[b, 2, a, 0] = xz
+            out[a, 1, b, 2] = out[b, 1, a, 2] = out[a, 2, b, 1] = out[b, 2, a, 1] = yz
+        for x in range(3):
+            out[a, x, a, x] += slip[a]
+    return out

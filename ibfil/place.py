@@ -1,0 +1,61 @@
+"""Where on a filament an observable looks: a node, a point between nodes, the centroid, a window."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .rods import weights
+
+At = str | float | tuple[float, float]
+
+
+def control_lengths(s: np.ndarray) -> np.ndarray:
+    """Length (N,) that belongs to each node: half of each neighbouring segment."""
+    half = 0.5 * np.diff(s)
+    return np.append(half, 0.0) + np.append(0.0, half)
+
+
+def point_weights(s: np.ndarray, at: float) -> np.ndarray:
+    """Weights (N,) of the nodes for the value at arclength ``at``: the cubic through four nodes."""
+    row = np.zeros(len(s))
+    nearest = int(np.argmin(np.abs(s - at)))
+    if abs(s[nearest] - at) <= 1e-9 * s[-1]:
+        row[nearest] = 1.0
+        return row
+    first = min(max(int(np.searchsorted(s, at)) - 2, 0), len(s) - 4)
+    row[first : first + 4] = weights(s[first : first + 4], at, 0)
+    return row
+
+
+class Place:
+    """One point, or the points of a window: its nodes and its two ends.
+
+    ``s`` (N,) is the nodes' arclength, ``at`` start, finish, middle, centroid, an arclength or a window [s1,
+    s2]. A mean over a window is over arclength; the centroid is the mean over the filament, as one point.
+    """
+
+    def __init__(self, s: np.ndarray, at: At) -> None:
+        if at == "centroid":
+            self._rows = control_lengths(s)[None] / (s[-1] - s[0])
+            self._share = np.ones(1)
+        elif isinstance(at, tuple):
+            inside = s[(s > at[0] + 1e-9 * s[-1]) & (s < at[1] - 1e-9 * s[-1])]
+            points = np.array([at[0], *inside, at[1]])
+            self._rows = np.array([point_weights(s, x) for x in points])
+            self._share = control_lengths(points) / (at[1] - at[0])
+        else:
+            named = {"start": s[0], "middle": 0.5 * s[-1], "finish": s[-1]}
+            self._rows = point_weights(s, float(named[at] if isinstance(at, str) else at))[None]
+            self._share = np.ones(1)
+
+    def values(self, field: np.ndarray) -> np.ndarray:
+        """Values (m,) or (m, 3) at its m points of a nodal field (N,) or (N, 3)."""
+        return self._rows @ field
+
+    def reduced(self, values: np.ndarray, how: str) -> np.ndarray:
+        """Take the mean, max or min of values (m,) or (m, 3); for ``how`` "none" there is only one."""
+        if how == "max":
+            return values.max(axis=0)
+        if how == "min":
+            return values.min(axis=0)
+        return self._share @ values

@@ -1,0 +1,162 @@
+"""What `ibfil check` says: what a case models and what it does not, what it costs, which steps are stable."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .case import idle_keys
+from .groups import groups, warnings
+from .simulation import Simulation
+
+if TYPE_CHECKING:
+    from .case import Case
+
+# Seconds, one thread of a machine of 2025: what the counts below are multiplied with for the estimate.
+_NODE, _PAIR, _FLOP, _CELL = 2.0e-6, 0.8e-6, 1.0e-10, 1.4e-8
+_ITERATIONS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}
+
+
+def report(case: Case) -> str:
+    """The text of `ibfil check`. Raises CaseError where the scene cannot be built."""
+    simulation = Simulation(case)
+    parts = [case.title or case.file, ""]
+    parts += _section("modelled", modelled(case))
+    parts += _section("not modelled", absent(case))
+    parts += _section("dimensionless groups", [f"{k} = {v:.4g}" for k, v in groups(simulation).items()])
+    parts += _section("size and cost", _costs(simulation))
+    parts += _section("step", _steps(simulation))
+    idle = idle_keys(case)
+    if idle:
+        parts += _section("idle keys (checked; not used by this fluid)", [", ".join(idle)])
+    parts += _section("warnings", warnings(simulation) or ["none"])
+    return "\n".join(parts).rstrip()
+
+
+def _section(title: str, lines: list[str]) -> list[str]:
+    return [f"{title}:", *(f"  {line}" for line in lines), ""]
+
+
+def modelled(case: Case) -> list[str]:
+    """Each term the case asks for, one line each."""
+    out = []
+    for name, f in case.filaments.items():
+        terms = ["bending", "stretching"] + (["twisting"] if f.twisting is not None else [])
+        if any(k.constant != 0 for k in (*f.curvature, f.twist_rate)):
+            terms.append("preferred strains")
+        for side, end in (("start", f.start), ("finish", f.finish)):
+            terms.append(f"{side} {end.end}")
+            if end.follower is not None:
+                terms.append(f"follower force at {side}")
+        out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
+    fluid = case.fluid
+    if fluid.model == "rft":
+        out.append("resistive-force drag on each node; no flow between nodes")
+        return out
+    out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
+    if fluid.slip:
+        out.append(f"slip mobility of {fluid.slip:g} of a point's own, against locking")
+    if any(f.twisting is not None for f in case.filaments.values()):
+        out.append("spin against the rod's own drag (rotation = local)")
+    return out
+
+
+def absent(case: Case) -> list[str]:
+    """What is left out, and so costs nothing."""
+    out = []
+    if all(f.twisting is None for f in case.filaments.values()):
+        out.append("twist: no twist unknowns; e1 is carried along")
+    if case.fluid.model == "rft":
+        out.append("hydrodynamic interaction; grid and FFT plans")
+    else:
+        out.append("torque coupling of the spin to the grid")
+    if case.output.grid_every is None:
+        out.append("field output")
+    if case.contact is None:
+        out.append("contact: filaments may pass through each other")
+    if case.thermal is None:
+        out.append("thermal noise")
+    out.append("inertia of the rod and of the fluid; walls; heads; closed rods")
+    return out
+
+
+def _bytes(count: float) -> str:
+    for unit in ("B", "KiB", "MiB"):
+        if count < 1024:
+            return f"{count:.3g} {unit}"
+        count /= 1024
+    return f"{count:.3g} GiB"
+
+
+def memory(simulation: Simulation) -> dict[str, float]:
+    """Bytes of the large arrays, by what they are for."""
+    case, n, m = simulation.case, len(simulation.arclength), simulation.mechanics.unknowns
+    out = {"band matrix": 8.0 * n * m * m * (2 * simulation.mechanics.profile.width + 1)}
+    if simulation.grid is None:
+        return out
+    from .kernels import KERNELS
+
+    cells = simulation.grid.cells
+    rim = KERNELS[case.fluid.kernel].points - 1
+    out["mobility table"] = 8.0 * 6 * float(np.prod(cells // 2 + 1 + 2 * rim))
+    out["dense matrices"] = 4 * 8.0 * (3 * n) ** 2
+    if simulation.method == "fft" or case.output.grid_every is not None:
+        out["fields and their transforms"] = 2 * 3 * 8.0 * float(np.prod(cells))
+    return out
+
+
+def _seconds_a_step(simulation: Simulation) -> float:
+    """From counts alone, so that the same case always gets the same answer."""
+    case, n = simulation.case, len(simulation.arclength)
+    rounds = _ITERATIONS[case.time.scheme]
+    seconds = rounds * n * _NODE
+    if simulation.grid is None:
+        return seconds
+    seconds += 0.5 * n * n * _PAIR + rounds * 4 * (3.0 * n) ** 3 * _FLOP
+    if simulation.method == "fft":
+        seconds += rounds * 4 * float(np.prod(simulation.grid.cells)) * _CELL
+    return seconds
+
+
+def _disk(simulation: Simulation) -> float:
+    case, n = simulation.case, len(simulation.arclength)
+    outputs = len(case.output.times or ()) or case.time.end / (case.output.every or case.time.end) + 1
+    size = outputs * n * 8.0 * 20
+    if simulation.grid is not None and case.output.grid_every is not None:
+        points = float(np.prod(np.ceil(simulation.grid.cells / case.output.grid_stride)))
+        size += (case.time.end / case.output.grid_every + 1) * points * 12.0 * len(case.output.fields)
+    return size
+
+
+def _costs(simulation: Simulation) -> list[str]:
+    case = simulation.case
+    unknowns = simulation.mechanics.unknowns
+    lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
+    if simulation.grid is not None:
+        lines.append(
+            f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {simulation.grid.spacing:.4g}"
+        )
+    used = memory(simulation)
+    parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
+    lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
+    lines.append(f"disk at most {_bytes(_disk(simulation))}, fields compressed")
+    steps = case.time.end / simulation.step_length
+    seconds = steps * _seconds_a_step(simulation)
+    lines.append(f"about {steps:.0f} steps, {seconds:.2g} s after start-up, from counts (within a factor 3)")
+    return lines
+
+
+def _steps(simulation: Simulation) -> list[str]:
+    case = simulation.case
+    chosen = "automatic" if case.time.step == "auto" else "given"
+    lines = [
+        f"{case.time.scheme}, order {case.time.order}: dt = {simulation.step_length:.4g} ({chosen})",
+        f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
+        "implicit and semi-implicit schemes: no such limit; accuracy decides",
+    ]
+    rates = simulation.driving_rates()
+    if rates and max(rates) > 0:
+        lines.append(f"shortest period of what drives the rods: {2 * np.pi / max(rates):.4g}")
+    lines.append(f"slowest bending time: {simulation.bending_time():.4g}")
+    return lines

@@ -1,0 +1,94 @@
+"""FFTs of real vector fields on the grid, by FFTW: three plans of one component each way.
+
+Plans are measured once and remembered as wisdom in the user's cache folder; the wisdom used is written into the run
+file, so a run that is resumed takes the same plans and gives the same bits.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pyfftw
+
+_LIMIT = 20.0  # seconds of planning a transform at the most
+
+
+def wisdom_file() -> Path:
+    """Where plans are remembered between runs."""
+    from platformdirs import user_cache_path
+
+    return user_cache_path("ibfil") / "fftw-wisdom.json"
+
+
+def learn(wisdom: str = "") -> None:
+    """Takes the plans in ``wisdom`` (of a run file), else those of the user's cache, if there are any."""
+    try:
+        text = wisdom or wisdom_file().read_text()
+        pyfftw.import_wisdom(tuple(base64.b64decode(part) for part in json.loads(text)))
+    except (OSError, ValueError, TypeError, IndexError, RecursionError):
+        return  # no cache, or a damaged one, costs planning time and nothing else
+
+
+def wisdom() -> str:
+    """The plans known now, as one line of text."""
+    return json.dumps([base64.b64encode(part).decode() for part in pyfftw.export_wisdom()])
+
+
+def remember() -> None:
+    """Writes the plans known now into the user's cache; a folder that cannot be written is no fault."""
+    path = wisdom_file()
+    part = path.with_suffix(f".{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(wisdom())
+        os.replace(part, path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink()
+
+
+class VectorTransform:
+    """Forward and backward transforms of ``real`` (3, nx, ny, nz) and ``modes`` (3, nx, ny, nz//2 + 1).
+
+    ``forward`` keeps ``real``; ``backward`` overwrites both, and leaves the normalisation 1/(nx ny nz) to the caller.
+    ``planning`` is FFTW's: "FFTW_ESTIMATE" for a few transforms, "FFTW_MEASURE" for many.
+    """
+
+    def __init__(self, cells: tuple[int, int, int], threads: int = 1, planning: str = "FFTW_MEASURE") -> None:
+        nx, ny, nz = cells
+        self.real = pyfftw.zeros_aligned((3, nx, ny, nz))
+        self.modes = pyfftw.zeros_aligned((3, nx, ny, nz // 2 + 1), dtype=complex)
+        self.size = nx * ny * nz
+
+        def plan(component: int, direction: str) -> pyfftw.FFTW:
+            ends = (self.real[component], self.modes[component])
+            return pyfftw.FFTW(
+                *(ends if direction == "FFTW_FORWARD" else ends[::-1]),
+                axes=(0, 1, 2),
+                direction=direction,
+                flags=(planning,) if direction == "FFTW_FORWARD" else (planning, "FFTW_DESTROY_INPUT"),
+                threads=threads,
+                planning_timelimit=_LIMIT,
+            )
+
+        self._forward = [plan(c, "FFTW_FORWARD") for c in range(3)]
+        self._backward = [plan(c, "FFTW_BACKWARD") for c in range(3)]
+        self.real[:] = 0.0
+        self.modes[:] = 0.0
+
+    def forward(self) -> np.ndarray:
+        """``modes`` of ``real``."""
+        for plan in self._forward:
+            plan.execute()
+        return self.modes
+
+    def backward(self) -> np.ndarray:
+        """``real`` of ``modes``, times the number of cells."""
+        for plan in self._backward:
+            plan.execute()
+        return self.real
