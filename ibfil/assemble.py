@@ -5,30 +5,35 @@ What the case does not name is not built here, so the step asks nothing about it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import laws, rft, shapes, stepping
+from . import assemble_laws, copies, costs, rft, shapes, stepping
+from .along import alone, along, half
 from .assemble_loads import loads, number, triple
-from .case_filament import ZERO
-from .case_schema import Matched
+from .case_schema import Coefficients, Matched
 from .ends import EndOf, HeldEnds, Turn, spinning, steady, turned
+from .errors import CaseError
 from .geometry import Geometry
 from .mechanics import Mechanics
-from .rods import Mesh, Segmented, stack
+from .rods import Segmented, stack
 
 if TYPE_CHECKING:
     from .case_filament import Filament
     from .case_schema import Case
-    from .expressions import Expression
+    from .contact import Contact
     from .fluid import Fluid
     from .grid import Grid
     from .kernels import Kernel
-    from .mechanics import Law
+    from .laws import MomentLaw
+    from .matched import Match
+    from .thermal import Noise
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ class Stacked:
     s: np.ndarray
     mechanics: Mechanics
     start: Geometry
+    contact: Contact | None
 
     @property
     def spacing(self) -> np.ndarray:
@@ -48,44 +54,6 @@ class Stacked:
         mesh = self.mechanics.mesh
         ends = ~mesh.joined | ~np.append(False, mesh.joined[:-1])
         return np.where(ends, 2.0, 1.0) * mesh.volume
-
-
-def _pieces(
-    filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray, pick: Callable[[Filament], Expression]
-) -> list[tuple[slice, Callable, np.ndarray]]:
-    """One function of (s, t) for each run of filaments that share an expression."""
-    runs: list[tuple[slice, Expression]] = []
-    for filament, where in zip(filaments, nodes, strict=True):
-        expression = pick(filament)
-        if runs and runs[-1][1] == expression:
-            runs[-1] = (slice(runs[-1][0].start, where.stop), expression)
-        else:
-            runs.append((where, expression))
-    return [(where, expression.bind("s", "t"), s[where]) for where, expression in runs]
-
-
-def _field(filaments, nodes, s: np.ndarray, pick: Callable[[Filament], Expression]) -> laws.Field:
-    """A field of time over all nodes; evaluated once where nothing in it depends on time."""
-    field = laws.gather(_pieces(filaments, nodes, s, pick), s.shape)
-    if any("t" in pick(f).variables for f in filaments):
-        return field
-    fixed = np.broadcast_to(field(0.0), s.shape).copy()
-    return lambda t: fixed
-
-
-def _along(filaments, nodes, s: np.ndarray, pick: Callable[[Filament], Expression]) -> np.ndarray:
-    """A property along the rods (n,)."""
-    return np.broadcast_to(_field(filaments, nodes, s, pick)(0.0), s.shape).astype(float)
-
-
-def _alone(expression: Expression, s: np.ndarray) -> np.ndarray:
-    """A property along one filament (k,)."""
-    return np.broadcast_to(expression.bind("s")(s), s.shape).astype(float)
-
-
-def _half(values: np.ndarray) -> np.ndarray:
-    """Values at half nodes from values at nodes, by the mean; the entry between two filaments is never used."""
-    return np.append(0.5 * (values[1:] + values[:-1]), values[-1])
 
 
 def _turn(end) -> Turn | None:
@@ -101,34 +69,49 @@ def _turn(end) -> Turn | None:
     return spinning(number(end.spin))
 
 
-def _place(case: Case) -> tuple[list[slice], list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-    """Node ranges, arclengths, start positions and directors of the filaments."""
-    nodes, arclengths, positions, directors = [], [], [], []
-    offset = 0
+Tangents = tuple[np.ndarray | None, np.ndarray | None]
+
+
+class Placed(NamedTuple):
+    """One filament where it starts: name, arclength (k,), positions and directors (k, 3), tangents of its clamps."""
+
+    name: str
+    filament: Filament
+    s: np.ndarray
+    r: np.ndarray
+    e1: np.ndarray
+    held: tuple[np.ndarray | None, ...]
+
+
+def _place(case: Case) -> list[Placed]:
+    """All filaments, copies one by one. Raises CaseError for shapes that cannot be made."""
+    out = []
     for name, filament in case.filaments.items():
-        key = f"{case.file}: filament.{name}"
+        key, folder = f"{case.file}: filament.{name}", Path(case.file).parent
         s = shapes.node_arclength(filament, key)
-        r, e1 = shapes.initial_shape(filament, key, Path(case.file).parent)
-        nodes.append(slice(offset, offset + len(s)))
-        offset += len(s)
-        arclengths.append(s)
-        positions.append(r)
-        directors.append(e1)
-    return nodes, arclengths, positions, directors
+        r, e1 = shapes.initial_shape(filament, key, folder)
+        held = _clamp_tangents(filament, key, folder)
+        if filament.copies is None:
+            out.append(Placed(name, filament, s, r, e1, held))
+            continue
+        for k, turn, shift in copies.places(filament.copies, filament.position, key, folder):
+            moved = (r - filament.position) @ turn.T + shift
+            turned = tuple(None if t is None else turn @ t for t in held)
+            out.append(Placed(f"{name}_{k:03d}", filament, s, moved, e1 @ turn.T, turned))
+    return out
 
 
-def _mesh(case: Case, arclengths: Sequence[np.ndarray]) -> Mesh:
-    """The stencils, with the tangents of clamped ends: those given, else those the start shape has there."""
-    parts = []
-    for (name, filament), s in zip(case.filaments.items(), arclengths, strict=True):
-        held: list[np.ndarray | None] = [None, None]
-        if "clamped" in (filament.start.end, filament.finish.end):
-            at = shapes.end_tangents(filament, f"{case.file}: filament.{name}", Path(case.file).parent)
-            for k, end in enumerate((filament.start, filament.finish)):
-                if end.end == "clamped":
-                    held[k] = at[k] if end.tangent is None else np.array(end.tangent) / np.linalg.norm(end.tangent)
-        parts.append(Segmented(s, filament.derivative, *held))
-    return stack(parts)
+def _clamp_tangents(filament: Filament, key: str, folder: Path) -> Tangents:
+    """The tangents that clamped ends hold: those given, else those the start shape has there."""
+    ends = (filament.start, filament.finish)
+    if "clamped" not in (end.end for end in ends):
+        return None, None
+    at = shapes.end_tangents(filament, key, folder)
+    held = []
+    for own, end in zip(at, ends, strict=True):
+        given = own if end.tangent is None else np.array(end.tangent) / np.linalg.norm(end.tangent)
+        held.append(given if end.end == "clamped" else None)
+    return held[0], held[1]
 
 
 def _ends(filaments, nodes, unknowns: int) -> tuple[HeldEnds, np.ndarray]:
@@ -146,65 +129,83 @@ def _ends(filaments, nodes, unknowns: int) -> tuple[HeldEnds, np.ndarray]:
     return HeldEnds(held, unknowns, np.array(idle, np.int64)), free
 
 
-def _internal(filament: Filament, part: int) -> Expression:
-    """The internal moment along e1 (0) or e2 (1); zero where the filament has none."""
-    if filament.loads is None or filament.loads.internal_moment is None:
-        return ZERO
-    return filament.loads.internal_moment[part]
+def _segmented(placed: Placed, thermal: bool) -> Segmented:
+    """A filament for the stack. Equipartition asks for a symmetric stiffness, which order 2 has with ghost nodes."""
+    derivative = placed.filament.derivative
+    return Segmented(placed.s, derivative, placed.held[0], placed.held[1], thermal and derivative == 2)
 
 
-def rods(case: Case) -> Stacked:
-    """All filaments of the case, placed and stacked. Raises CaseError for shapes that cannot be made."""
-    names, filaments = tuple(case.filaments), tuple(case.filaments.values())
-    nodes, arclengths, positions, directors = _place(case)
-    s = np.concatenate(arclengths)
-    mesh = _mesh(case, arclengths)
+def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> Stacked:
+    """All filaments of the case, placed and stacked; ``given`` are laws made in Python, by filament.
+
+    Raises CaseError for shapes that cannot be made and laws of filaments there are not.
+    """
+    for name in set(given) - set(case.filaments):
+        raise CaseError([f"{case.file}: laws: found {name}; allowed: one of {', '.join(case.filaments)}"])
+    placed = _place(case)
+    filaments, positions = tuple(p.filament for p in placed), [p.r for p in placed]
+    offsets = np.cumsum([0] + [len(p.s) for p in placed]).tolist()
+    nodes = [slice(a, b) for a, b in pairwise(offsets)]
+    s = np.concatenate([p.s for p in placed])
+    mesh = stack([_segmented(p, case.thermal is not None) for p in placed])
     unknowns = 4 if any(f.twisting is not None for f in filaments) else 3
     ends, free = _ends(filaments, nodes, unknowns)
-    bending = np.stack([_along(filaments, nodes, s, lambda f, a=a: f.bending[a]) for a in (0, 1)], axis=1)  # type: ignore[misc]
-    torsion = np.zeros(len(s))
-    for filament, where in zip(filaments, nodes, strict=True):
-        if filament.twisting is not None:
-            at = slice(where.start, where.stop - 1)
-            torsion[at] = _half(_alone(filament.twisting, s[where]))[:-1]
-    law: Law = laws.Linear(
-        bending,
-        torsion,
-        (
-            _field(filaments, nodes, s, lambda f: f.curvature[0]),
-            _field(filaments, nodes, s, lambda f: f.curvature[1]),
-        ),
-        _field(filaments, nodes, s, lambda f: f.twist_rate),
-    )
-    if any(f.loads is not None and f.loads.internal_moment is not None for f in filaments):
-        along_e1 = _field(filaments, nodes, s, lambda f: _internal(f, 0))
-        law = laws.Driven(law, (along_e1, _field(filaments, nodes, s, lambda f: _internal(f, 1))))
-    stretching = _half(_along(filaments, nodes, s, lambda f: f.stretching))
+    own = [next((law for name, law in given.items() if case.filaments[name] is f), None) for f in filaments]
+    law = assemble_laws.law(filaments, nodes, s, mesh, own)
+    stretching = half(along(filaments, nodes, s, lambda f: f.stretching))
     length = min(f.length for f in filaments)
     kind = Mechanics
     if filaments[0].force == "torque-free":
         from .torque_free import TorqueFree
 
         kind = TorqueFree
-    forces = loads(filaments, nodes, s, mesh, positions)
+    forces, names = loads(filaments, nodes, s, mesh, positions), tuple(p.name for p in placed)
+    touching = None
+    if case.contact is not None:
+        from . import contact
+
+        touching = contact.build(case, names, filaments, nodes, s)
+        forces += touching.loads()
     mechanics = kind(mesh, law, stretching, free, ends, forces, unknowns, length)
-    start = mechanics.start(np.concatenate(positions), np.concatenate(directors))
-    return Stacked(names, filaments, tuple(nodes), s, mechanics, start)
+    start = mechanics.start(np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
+    return Stacked(names, filaments, tuple(nodes), s, mechanics, start, touching)
 
 
 def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None) -> tuple[float, float, np.ndarray]:
-    """Drag per length across and along the rod, and against spin (k,): "paper", "slender" (Sec. 7.5) or explicit."""
+    """Drag per length across and along the rod, and against spin (k,): paper, slender (Sec. 7.5), given, matched."""
     eta, drag = case.fluid.viscosity, case.fluid.drag
     spin = np.zeros(1) if radius is None else 4 * np.pi * eta * radius**2
-    if drag == "paper":
-        return 4 * np.pi * eta, 2 * np.pi * eta, spin
+    if isinstance(drag, Coefficients):
+        return drag.perp, drag.par, spin if drag.spin is None else np.full(1, drag.spin)
+    found = matching(case, filament)
+    if found is not None:
+        return eta * found.perp, eta * found.par, spin
     if drag == "slender":
         if radius is None:
             raise ValueError("slender drag needs a radius")
         perp = 8 * np.pi * eta / np.log(filament.length**2 / (4 * float(np.mean(radius)) ** 2 * np.e))
         return perp, 0.5 * perp, spin
-    assert not isinstance(drag, Matched)  # refused by not_built
-    return drag.perp, drag.par, spin if drag.spin is None else np.full(1, drag.spin)
+    return 4 * np.pi * eta, 2 * np.pi * eta, spin
+
+
+def matching(case: Case, filament: Filament) -> Match | None:
+    """The drag of a straight rod in the case's grid; None where RFT does not take its drag from there.
+
+    Raises CaseError where the grid cannot tell it.
+    """
+    drag = case.fluid.drag
+    if case.fluid.model != "rft" or not isinstance(drag, Matched):
+        return None
+    from . import matched
+
+    box, cells = case.fluid.box, case.fluid.cells or cells_of_thickness(case)
+    assert box is not None
+    nodes = 1 + round(drag.matched * (filament.nodes - 1) / filament.length)
+    try:
+        return matched.match(matched.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip))
+    except ValueError as error:
+        allowed = "slip = 0.01, fewer nodes or more cells"
+        raise CaseError([f"{case.file}: fluid.drag: {error}; allowed: {allowed}"]) from None
 
 
 def drag(case: Case, stacked: Stacked) -> rft.Drag:
@@ -215,7 +216,7 @@ def drag(case: Case, stacked: Stacked) -> rft.Drag:
         s = stacked.s[where]
         radius = None
         if filament.radius is not None:
-            radius = _alone(filament.radius, s)
+            radius = alone(filament.radius, s)
         for field, value in zip(out, drag_coefficients(case, filament, radius), strict=True):
             field[where] = value * volume[where]
     # A filament that does not twist has its turn held; any positive drag will do for the row.
@@ -242,23 +243,94 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     """The fluid of the case, the method chosen, and its grid (None in RFT)."""
     if case.fluid.model == "rft":
         return rft.ResistiveForce(drag(case, stacked), stacked.mechanics.profile, flow(case)), "rft", None
-    from . import stokes
+    from . import immersed, stokes
     from .grid import Grid
+    from .pruned import PrunedSolve
 
     assert case.fluid.box is not None
-    assert case.fluid.cells is not None
-    grid, eta = Grid(case.fluid.box, case.fluid.cells), case.fluid.viscosity
-    slip = stokes.slip_mobility(case.fluid.slip, kernel(case), grid, eta, stacked.spacing)
+    grid, eta = Grid(case.fluid.box, case.fluid.cells or cells_of_thickness(case)), case.fluid.viscosity
+    slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, eta, stacked.spacing)
     spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 else None
-    immersed = stokes.Immersed(grid, kernel(case), eta, slip, spin, flow(case))
-    if case.fluid.method == "fft":
-        solve = stokes.StokesSolve(grid, eta, case.compute.threads)
-        return stokes.StokesByFFT(immersed, solve), "fft", grid
-    return stokes.StokesByTable(immersed), "table", grid
+    made = immersed.Immersed(grid, kernel(case), eta, slip, spin, flow(case), stacked.nodes)
+    seconds = method_seconds(case, stacked, grid)
+    method = case.fluid.method if case.fluid.method != "auto" else min(seconds, key=lambda name: seconds[name])
+    if method == "table":
+        return stokes.StokesByTable(made), method, grid
+    kind = stokes.StokesByKrylov if method == "krylov" else stokes.StokesByFFT
+    whole = method == "fft" or (method == "krylov" and not fills_little(case, stacked, grid))
+    solver = (stokes.StokesSolve if whole else PrunedSolve)(grid, eta, case.compute.threads)
+    return kind(made, solver), method, grid
 
 
-def stepper(case: Case) -> stepping.Stepper:
-    """The scheme of the case."""
+def _box(case: Case, stacked: Stacked, grid: Grid) -> list[int]:
+    """Extents, in cells, of the box that holds the filaments' stencils at the start."""
+    from .pruned import bounding_box
+
+    base, _ = kernel(case).stencil(grid.coordinates(stacked.start.r))
+    return bounding_box(base, kernel(case).points, grid.cells)[1]
+
+
+def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str, float]:
+    """Estimated seconds of a step by each method that the fluid has, from counts."""
+    if grid is None:
+        return costs.seconds_a_step(case, len(stacked.s))
+    return costs.seconds_a_step(case, len(stacked.s), grid.cells.tolist(), _box(case, stacked, grid))
+
+
+def fills_little(case: Case, stacked: Stacked, grid: Grid) -> bool:
+    """Whether transforms of the filaments' bounding box alone are the cheaper ones."""
+    cells = grid.cells.tolist()
+    return costs.pruned_evaluation(cells, _box(case, stacked, grid)) < costs.full_evaluation(cells)
+
+
+def cells_of_thickness(case: Case) -> tuple[int, int, int]:
+    """The cells that give ``thickness`` as the hydrodynamic line radius, or the nearest below. Raises CaseError."""
+    from .grid import cells_for, smooth
+
+    box, thickness = case.fluid.box, case.fluid.thickness
+    assert box is not None
+    assert thickness is not None
+    largest = thickness / kernel(case).line_radius
+    cells = cells_for(box, largest)
+    if cells is None:
+        n = next(k for k in range(int(np.ceil(box[0] / largest)), 10**6) if smooth(k))
+        h = box[0] / n
+        fits = [h * next(k for k in range(max(1, round(side / h)), 10**6) if smooth(k)) for side in box]
+        raise CaseError(
+            [
+                f"{case.file}: fluid.thickness: found {thickness:g}, for which no grid within 20 % has smooth numbers "
+                f"of cells on all axes of box = {list(box)}; allowed: for example box = {[round(x, 10) for x in fits]}"
+            ]
+        )
+    return cells
+
+
+def noise(case: Case, stacked: Stacked) -> Noise | None:
+    """The thermal noise of the case; None where it has none."""
+    thermal = case.thermal
+    if thermal is None:
+        return None
+    from .thermal import Noise
+
+    mechanics = stacked.mechanics
+    return Noise(
+        drag(case, stacked),
+        mechanics.mesh,
+        mechanics.ends.index,
+        mechanics.unknowns,
+        thermal.energy,
+        thermal.seed,
+        thermal.directions == "xy",
+        thermal.twist,
+    )
+
+
+def stepper(case: Case, noise: Noise | None) -> stepping.Stepper:
+    """The scheme of the case; with thermal forces the one that keeps their statistics."""
+    if noise is not None:
+        from .thermal import Trapezoid
+
+        return Trapezoid(noise)
     if case.time.scheme == "explicit":
         return stepping.Explicit()
     if case.time.scheme == "semi-implicit":

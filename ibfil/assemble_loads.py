@@ -21,9 +21,7 @@ _DIFFERENCE = 1e-5  # of the length: the step by which a force that depends on p
 def triple(expressions: Sequence[Expression], *names: str) -> Callable[..., np.ndarray]:
     """Three expressions as one function of arrays (k,), giving (k, 3); of scalars, giving (3,)."""
     parts = [e.bind(*names) for e in expressions]
-    return lambda *values: np.stack(
-        np.broadcast_arrays(*(np.asarray(part(*values), float) for part in parts)), axis=-1
-    )
+    return lambda *values: np.stack(np.broadcast_arrays(*(np.asarray(part(*values), float) for part in parts)), axis=-1)
 
 
 def number(expression: Expression) -> Callable[[float], float]:
@@ -46,13 +44,13 @@ def loads(
             (filament.start, where.start, False),
             (filament.finish, where.stop - 1, True),
         ):
-            out += _on_end(end, node, finish, mesh)
+            out += _on_end(end, node, finish, mesh, filament.force == "torque-free")
         if filament.loads is not None:
             out += _along(filament, where, s[where], mesh, r)
     return out
 
 
-def _on_end(end: End, node: int, finish: bool, mesh: Mesh) -> list[Load]:
+def _on_end(end: End, node: int, finish: bool, mesh: Mesh, torque_free: bool) -> list[Load]:
     out: list[Load] = []
     at = np.array([node])
     if end.follower is not None and end.follower.constant != 0.0:
@@ -61,7 +59,7 @@ def _on_end(end: End, node: int, finish: bool, mesh: Mesh) -> list[Load]:
         force = triple(end.force, "t")
         out.append(Dead(at, lambda t: force(t)[None]))
     if end.moment is not None:
-        out.append(EndMoment(mesh, node, finish, triple(end.moment, "t"), end.frame == "body"))
+        out.append(EndMoment(mesh, node, finish, triple(end.moment, "t"), end.frame == "body", torque_free))
     if end.spring is not None:
         to = np.array([end.spring.to])
         out.append(Tether(at, np.array([end.spring.stiffness]), lambda t: to))

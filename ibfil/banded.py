@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from scipy.linalg import solve_banded
 
+from .blocks import invert, less, less_times, part, product, put, put_part, take, times
 from .rods import Mesh
 
-_RUN = 16  # entries of a factor's row beside the diagonal that are kept together: whole vector registers
 _SMALLEST = 1e-12  # a pivot inside a diagonal block, relative to the block's largest entry
 
 
@@ -28,25 +28,32 @@ class Profile(NamedTuple):
     width: int
 
 
-def profile(mesh: Mesh) -> Profile:
-    """Which displacements a node's force feels: the stencils of the node and of its neighbours, fill included."""
+def _spread(low: np.ndarray, high: np.ndarray, joined: np.ndarray, times: int) -> tuple[np.ndarray, np.ndarray]:
+    """First and last nodes (n,) that rows reach, given those of each node's stencil, after ``times`` neighbours."""
+    for _ in range(times):
+        first, last = low.copy(), high.copy()
+        first[1:] = np.where(joined, np.minimum(first[1:], low[:-1]), first[1:])
+        first[:-1] = np.where(joined, np.minimum(first[:-1], low[1:]), first[:-1])
+        last[1:] = np.where(joined, np.maximum(last[1:], high[:-1]), last[1:])
+        last[:-1] = np.where(joined, np.maximum(last[:-1], high[1:]), last[:-1])
+        low, high = first, last
+    return low, high
+
+
+def profile(mesh: Mesh, neighbours: int = 1) -> Profile:
+    """Which displacements a node's force feels: its stencils and those of ``neighbours`` each side; fill included."""
     n, p = mesh.w1.shape
-    columns = mesh.first[:, None] + np.arange(p)
+    columns, rows, joined = mesh.first[:, None] + np.arange(p), np.arange(n), mesh.joined[:-1]
+    # Kernels write whole stencils, zero weights and all: the band must hold them.
+    low, high = _spread(np.minimum(columns[:, 0], rows), np.maximum(columns[:, -1], rows), joined, neighbours)
+    width = int(max(np.max(rows - low), np.max(high - rows)))
     used = (mesh.w1 != 0) | (mesh.w2 != 0)
-    rows = np.arange(n)
     low = np.minimum(np.where(used, columns, n).min(axis=1), rows)
     high = np.maximum(np.where(used, columns, -1).max(axis=1), rows)
-    first, last = low.copy(), high.copy()
-    joined = mesh.joined[:-1]
-    first[1:] = np.where(joined, np.minimum(first[1:], low[:-1]), first[1:])
-    first[:-1] = np.where(joined, np.minimum(first[:-1], low[1:]), first[:-1])
-    last[1:] = np.where(joined, np.maximum(last[1:], high[:-1]), last[1:])
-    last[:-1] = np.where(joined, np.maximum(last[:-1], high[1:]), last[:-1])
+    first, last = _spread(low, high, joined, neighbours)
     for i in range(n):
         last[i] = max(last[i], last[first[i] : i + 1].max())
-    # Kernels write whole stencils, zero weights and all, into the rows on either side: the band must hold them.
-    reach = max(int(np.max(rows - mesh.first)), int(np.max(mesh.first + p - 1 - rows))) + 1
-    return Profile(first, last, reach)
+    return Profile(first, last, max(width, int(np.max(last - rows))))
 
 
 @njit(cache=True)
@@ -67,129 +74,54 @@ def multiply(matrix, x):
     return out
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _invert(block, unit, smallest):
-    """Inverts a small block in place by Gauss-Jordan with row pivoting. False where a pivot vanishes."""
-    m = len(unit)
-    size = 0.0
-    for a in range(m):
-        for b in range(m):
-            size = max(size, abs(block[a, b]))
-    swap = np.empty(4, np.int64)
-    for k in range(m):
-        p = k
-        for a in range(k + 1, m):
-            if abs(block[a, k]) > abs(block[p, k]):
-                p = a
-        swap[k] = p
-        if not abs(block[p, k]) > smallest * size:
-            return False
-        for b in range(m):
-            block[k, b], block[p, b] = block[p, b], block[k, b]
-        f = 1.0 / block[k, k]
-        block[k, k] = 1.0
-        for b in range(m):
-            block[k, b] *= f
-        for a in range(m):
-            if a != k:
-                f = block[a, k]
-                block[a, k] = 0.0
-                for b in range(m):
-                    block[a, b] -= f * block[k, b]
-    for k in range(m - 1, -1, -1):
-        for a in range(m):
-            block[a, k], block[a, swap[k]] = block[a, swap[k]], block[a, k]
-    return True
-
-
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _eliminate(matrix, x, first, last, unit, near, smallest):
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def eliminate(matrix, x, first, last, unit):
     """Block elimination; the answer overwrites ``x`` (n, m). False where a diagonal block is nearly singular.
 
-    Rows of the factor lie packed in ``upper``: a block row beside the diagonal as m runs of 16 entries, then, where
-    a row reaches further, its rest; ``unit`` and ``near`` are tuples of m and of 16 entries, lengths the compiler
-    knows. Every inner loop is then a fixed number of products of numbers that lie side by side.
+    Row by row, A_ij - sum_k L_ik U_kj is gathered in registers over all k and written once: it is L_ij times the
+    diagonal block j, or that diagonal block, or U_ij. ``unit`` is a tuple of m entries.
     """
-    n, m, c4 = matrix.shape[0], len(unit), len(near)
-    columns = matrix.shape[2]
-    width = columns + c4  # of the working row: the last runs may read past the band, into zeros
-    middle = (columns // m - 1) // 2 * m
-    upper, inverse = np.zeros((n, m * len(near))), np.empty((n, m * m))
-    far = np.empty((n, m, middle))
-    work, factor, block = np.zeros(m * width), np.empty(m * m), np.empty((m, m))
-    right = np.empty(m)
+    n, m, columns = matrix.shape
+    w = (columns // m - 1) // 2
+    blocks = matrix.reshape(n, m, columns // m, m).transpose(0, 2, 1, 3)
+    upper, factor, inverse = np.empty((n, w, m, m)), np.empty((1, w, m, m)), np.empty((n, 1, m, m))
     for i in range(n):
-        for a in range(m):
-            right[a] = x[i, a]
-            for c in range(columns):
-                work[a * width + c] = matrix[i, a, c]
-            for c in range(columns, width):
-                work[a * width + c] = 0.0
-        for k in range(first[i], i):
-            at = (k - i) * m + middle
-            for a in range(m):
-                for b in range(m):
-                    s = 0.0
-                    for c in range(m):
-                        s += work[a * width + at + c] * inverse[k, c * m + b]
-                    factor[a * m + b] = s
-            for a in range(m):
-                to = a * width + at + m
-                if len(unit) == 3:
-                    f0, f1, f2 = factor[a * 3], factor[a * 3 + 1], factor[a * 3 + 2]
-                    for c in range(len(near)):
-                        work[to + c] -= f0 * upper[k, c] + f1 * upper[k, 16 + c] + f2 * upper[k, 32 + c]
-                else:
-                    f0, f1, f2, f3 = factor[a * 4], factor[a * 4 + 1], factor[a * 4 + 2], factor[a * 4 + 3]
-                    for c in range(len(near)):
-                        v = f0 * upper[k, c] + f1 * upper[k, 16 + c] + f2 * upper[k, 32 + c] + f3 * upper[k, 48 + c]
-                        work[to + c] -= v
-                for b in range(m):
-                    right[a] -= factor[a * m + b] * x[k, b]
-            beyond = (last[k] - k) * m - c4
-            if beyond > 0:
-                for a in range(m):
-                    for b in range(m):
-                        for c in range(beyond):
-                            work[a * width + at + m + c4 + c] -= factor[a * m + b] * far[k, b, c]
-        for a in range(m):
-            for b in range(m):
-                block[a, b] = work[a * width + middle + b]
-        if not _invert(block, unit, smallest):
-            return False
-        for a in range(m):
-            x[i, a] = right[a]
-            for b in range(m):
-                inverse[i, a * m + b] = block[a, b]
-            for c in range(min(c4, (last[i] - i) * m)):
-                upper[i, a * c4 + c] = work[a * width + middle + m + c]
-            for c in range((last[i] - i) * m - c4):
-                far[i, a, c] = work[a * width + middle + m + c4 + c]
-    flat = x.ravel()
+        low = first[i]
+        for j in range(low, last[i] + 1):
+            s = take(blocks, i, j - i + w, unit)
+            for k in range(low, min(i, j)):
+                if last[k] >= j:
+                    s = less(s, take(factor, 0, k - low, unit), take(upper, k, j - k - 1, unit))
+            if j < i:
+                put(factor, 0, j - low, product(s, take(inverse, j, 0, unit)))
+            elif j > i:
+                put(upper, i, j - i - 1, s)
+            else:
+                put(inverse, i, 0, s)
+                if not invert(inverse, i, unit, _SMALLEST):
+                    return False
+        y = part(x, i, unit)
+        for k in range(low, i):
+            y = less_times(y, take(factor, 0, k - low, unit), part(x, k, unit))
+        put_part(x, i, y)
     for i in range(n - 1, -1, -1):
-        reach = (last[i] - i) * m
-        for a in range(m):
-            s = flat[i * m + a]
-            for c in range(min(c4, reach)):
-                s -= upper[i, a * c4 + c] * flat[(i + 1) * m + c]
-            for c in range(c4, reach):
-                s -= far[i, a, c - c4] * flat[(i + 1) * m + c]
-            right[a] = s
-        for a in range(m):
-            s = 0.0
-            for b in range(m):
-                s += inverse[i, a * m + b] * right[b]
-            x[i, a] = s
+        y = part(x, i, unit)
+        for j in range(i + 1, last[i] + 1):
+            y = less_times(y, take(upper, i, j - i - 1, unit), part(x, j, unit))
+        put_part(x, i, times(take(inverse, i, 0, unit), y))
     return True
 
 
 def solve(matrix: np.ndarray, right: np.ndarray, where: Profile) -> np.ndarray:
     """x (n, m) with ``matrix`` x = ``right``. Raises numpy.linalg.LinAlgError where the matrix is singular."""
-    m = right.shape[1]
     x = right.copy()
-    zeros = (0,) * m
-    if _eliminate(matrix, x, where.first, where.last, zeros, (0,) * _RUN, _SMALLEST):
+    if eliminate(matrix, x, where.first, where.last, (0,) * right.shape[1]):
         return x
+    return solve_pivoted(matrix, right)
+
+
+def solve_pivoted(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The same by LAPACK, with pivoting. Raises numpy.linalg.LinAlgError where the matrix is singular."""
     upper, diagonals = lapack_form(matrix)
     return solve_banded((upper, upper), diagonals, right.ravel()).reshape(right.shape)
 

@@ -10,31 +10,95 @@ from numba import njit
 
 
 @njit(cache=True)
-def _row(a, i, r, c, unit):
+def _row(a, i, j, r, unit):
     if len(unit) == 3:
-        return a[i, r, c], a[i, r, c + 1], a[i, r, c + 2]
-    return a[i, r, c], a[i, r, c + 1], a[i, r, c + 2], a[i, r, c + 3]
+        return a[i, j, r, 0], a[i, j, r, 1], a[i, j, r, 2]
+    return a[i, j, r, 0], a[i, j, r, 1], a[i, j, r, 2], a[i, j, r, 3]
 
 
 @njit(cache=True)
-def take(a, i, c, unit):
-    """The block of ``a`` (n, m, columns) in row i from column c."""
+def take(a, i, j, unit):
+    """The block ``a[i, j]`` (m, m)."""
     if len(unit) == 3:
-        return _row(a, i, 0, c, unit), _row(a, i, 1, c, unit), _row(a, i, 2, c, unit)
-    return _row(a, i, 0, c, unit), _row(a, i, 1, c, unit), _row(a, i, 2, c, unit), _row(a, i, 3, c, unit)
+        return _row(a, i, j, 0, unit), _row(a, i, j, 1, unit), _row(a, i, j, 2, unit)
+    return _row(a, i, j, 0, unit), _row(a, i, j, 1, unit), _row(a, i, j, 2, unit), _row(a, i, j, 3, unit)
 
 
 @njit(cache=True)
-def put(a, i, c, block):
-    """Writes a block into row i of ``a`` (n, m, columns) from column c."""
+def put(a, i, j, block):
+    """Writes a block into ``a[i, j]``."""
     for r in range(len(block)):
-        for k in range(len(block)):
-            a[i, r, c + k] = block[r][k]
+        for c in range(len(block)):
+            a[i, j, r, c] = block[r][c]
+
+
+@njit(cache=True)
+def part(x, i, unit):
+    """The vector x[i] of x (n, m)."""
+    if len(unit) == 3:
+        return x[i, 0], x[i, 1], x[i, 2]
+    return x[i, 0], x[i, 1], x[i, 2], x[i, 3]
+
+
+@njit(cache=True)
+def put_part(x, i, v):
+    """Writes a vector into x[i]."""
+    for k in range(len(v)):
+        x[i, k] = v[k]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _dot(f, x):
+    if len(f) == 3:
+        return f[0] * x[0] + f[1] * x[1] + f[2] * x[2]
+    return f[0] * x[0] + f[1] * x[1] + f[2] * x[2] + f[3] * x[3]
+
+
+@njit(cache=True)
+def times(f, x):
+    """The vector f x of a block and a vector."""
+    if len(x) == 3:
+        return _dot(f[0], x), _dot(f[1], x), _dot(f[2], x)
+    return _dot(f[0], x), _dot(f[1], x), _dot(f[2], x), _dot(f[3], x)
+
+
+@njit(cache=True, fastmath={"contract"})
+def less_times(y, f, x):
+    """The vector y - f x."""
+    v = times(f, x)
+    if len(y) == 3:
+        return y[0] - v[0], y[1] - v[1], y[2] - v[2]
+    return y[0] - v[0], y[1] - v[1], y[2] - v[2], y[3] - v[3]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _row_product(f, u):
+    """f u for one row f (m,) and a block."""
+    if len(f) == 3:
+        return (
+            f[0] * u[0][0] + f[1] * u[1][0] + f[2] * u[2][0],
+            f[0] * u[0][1] + f[1] * u[1][1] + f[2] * u[2][1],
+            f[0] * u[0][2] + f[1] * u[1][2] + f[2] * u[2][2],
+        )
+    return (
+        f[0] * u[0][0] + f[1] * u[1][0] + f[2] * u[2][0] + f[3] * u[3][0],
+        f[0] * u[0][1] + f[1] * u[1][1] + f[2] * u[2][1] + f[3] * u[3][1],
+        f[0] * u[0][2] + f[1] * u[1][2] + f[2] * u[2][2] + f[3] * u[3][2],
+        f[0] * u[0][3] + f[1] * u[1][3] + f[2] * u[2][3] + f[3] * u[3][3],
+    )
+
+
+@njit(cache=True)
+def product(f, u):
+    """The block f u."""
+    if len(f) == 3:
+        return _row_product(f[0], u), _row_product(f[1], u), _row_product(f[2], u)
+    return _row_product(f[0], u), _row_product(f[1], u), _row_product(f[2], u), _row_product(f[3], u)
 
 
 @njit(cache=True, fastmath={"contract"})
 def _less_row(s, f, u):
-    """s - f u for one row: s and f (m,), u (m, m)."""
+    """s - f u for one row: s and f (m,)."""
     if len(s) == 3:
         return (
             s[0] - f[0] * u[0][0] - f[1] * u[1][0] - f[2] * u[2][0],
@@ -57,16 +121,26 @@ def less(s, f, u):
     return _less_row(s[0], f[0], u), _less_row(s[1], f[1], u), _less_row(s[2], f[2], u), _less_row(s[3], f[3], u)
 
 
-@njit(cache=True, fastmath={"contract"})
-def _dot(f, x):
-    if len(f) == 3:
-        return f[0] * x[0] + f[1] * x[1] + f[2] * x[2]
-    return f[0] * x[0] + f[1] * x[1] + f[2] * x[2] + f[3] * x[3]
+@njit(cache=True, inline="always")
+def invert(a, i, unit, smallest):
+    """Inverts the block ``a[i, 0]`` (m, m) in place, by Gauss and Jordan without pivoting.
 
-
-@njit(cache=True)
-def times(f, x):
-    """The vector f x of a block and a vector (m,)."""
-    if len(x) == 3:
-        return _dot(f[0], x), _dot(f[1], x), _dot(f[2], x)
-    return _dot(f[0], x), _dot(f[1], x), _dot(f[2], x), _dot(f[3], x)
+    False where a pivot is below ``smallest`` times the block's largest entry, or not a number.
+    """
+    m, size, good = len(unit), 0.0, True
+    for r in range(m):
+        for c in range(m):
+            size = max(size, abs(a[i, 0, r, c]))
+    for k in range(m):
+        good = good and abs(a[i, 0, k, k]) > smallest * size
+        f = 1.0 / a[i, 0, k, k]
+        a[i, 0, k, k] = 1.0
+        for c in range(m):
+            a[i, 0, k, c] *= f
+        for r in range(m):
+            if r != k:
+                f = a[i, 0, r, k]
+                a[i, 0, r, k] = 0.0
+                for c in range(m):
+                    a[i, 0, r, c] -= f * a[i, 0, k, c]
+    return good

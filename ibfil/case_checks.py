@@ -16,6 +16,7 @@ from .case_schema import Coefficients, Fluid, Matched, Observe, Scene
 from .expressions import ExpressionError, suggestion
 
 SUPPORT = {"roma3": 3, "peskin4": 4, "bspline4": 4, "bspline6": 6, "bkp6": 6, "es4": 4, "es5": 5, "es6": 6}
+LONGEST = 500  # segments of the straight rod that drag is matched to: more would be a long wait
 VECTORS = (
     "position",
     "velocity",
@@ -30,8 +31,30 @@ def check(case: Scene) -> Iterator[Fault]:
     """All faults of what does not go together."""
     for name, filament in case.filaments.items():
         yield from check_filament(name, filament, case)
-    for part in (_contact, _fluid, _grid, _drag, _thermal, _time, _output, _observe, _stops, _expect):
+    for part in (
+        _one_force,
+        _contact,
+        _fluid,
+        _grid,
+        _drag,
+        _matched,
+        _thermal,
+        _time,
+        _output,
+        _observe,
+        _stops,
+        _expect,
+    ):
         yield from part(case)
+
+
+def _one_force(case: Scene) -> Iterator[Fault]:
+    """All filaments of a scene have the same discrete force."""
+    (first, one), *others = case.filaments.items()
+    for name, filament in others:
+        if filament.force != one.force:
+            key = f"filament.{first}.force"
+            yield Fault(f"filament.{name}.force", shown(filament.force), f"{shown(one.force)}, as {key}", (key,))
 
 
 def _contact(case: Scene) -> Iterator[Fault]:
@@ -88,7 +111,8 @@ def _grid(case: Scene) -> Iterator[Fault]:
     needed = fluid.model != "rft" or isinstance(fluid.drag, Matched)
     reads = ("fluid.model", "fluid.drag")
     if needed and fluid.box is None:
-        yield Fault("fluid.box", "nothing", "three lengths: this fluid has a grid", reads)
+        why = "this fluid has a grid" if fluid.model != "rft" else "drag is matched to a grid"
+        yield Fault("fluid.box", "nothing", f"three lengths: {why}", reads)
     if needed and fluid.cells is None and fluid.thickness is None:
         yield Fault("fluid.cells", "nothing, and no thickness", "cells or thickness", (*reads, "fluid.thickness"))
     if fluid.cells is not None and fluid.thickness is not None:
@@ -138,6 +162,22 @@ def _drag(case: Scene) -> Iterator[Fault]:
                 yield Fault(key, f"{filament.radius.constant:.6g}", allowed, reads)
 
 
+def _matched(case: Scene) -> Iterator[Fault]:
+    """The straight rod whose drag is measured is between one segment and the box long."""
+    fluid = case.fluid
+    if fluid.model != "rft" or not isinstance(fluid.drag, Matched):
+        return
+    key, length, found = "fluid.drag.matched", fluid.drag.matched, f"{fluid.drag.matched:g}"
+    if fluid.box is not None and length >= min(fluid.box):
+        allowed = f"below the smallest side of fluid.box, {min(fluid.box):g}"
+        yield Fault(key, found, allowed, ("fluid.box", "fluid.model"))
+    for name, filament in case.filaments.items():
+        ds = filament.length / (filament.nodes - 1)
+        reads = (f"filament.{name}.length", f"filament.{name}.nodes", "fluid.model")
+        if not ds <= length <= LONGEST * ds:
+            yield Fault(key, found, f"{ds:g} to {LONGEST * ds:g}: 1 to {LONGEST} segments of {name}", reads)
+
+
 # --- noise, time, output --------------------------------------------------------------------------
 
 
@@ -145,7 +185,10 @@ def _thermal(case: Scene) -> Iterator[Fault]:
     if case.thermal is None:
         return
     if case.fluid.model != "rft":
-        yield Fault("thermal", f"thermal noise in {case.fluid.model}", 'fluid.model = "rft"', ("fluid.model",))
+        found = (
+            f"thermal forces and fluid.model = {shown(case.fluid.model)}, in which kicks of different nodes are related"
+        )
+        yield Fault("thermal", found, 'only fluid.model = "rft"', ("fluid.model",))
     if case.thermal.twist and all(filament.twisting is None for filament in case.filaments.values()):
         yield Fault("thermal.twist", "true", "false where no filament has twisting", ("filament",))
     if case.time.scheme != "semi-implicit":
@@ -155,6 +198,9 @@ def _thermal(case: Scene) -> Iterator[Fault]:
             '"semi-implicit", the only one with [thermal]',
             ("thermal",),
         )
+    if case.time.tolerance is not None:
+        found = "a tolerance with [thermal], whose kicks no shorter step follows more closely"
+        yield Fault("time.tolerance", found, "time.step", ("thermal",))
 
 
 def _time(case: Scene) -> Iterator[Fault]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from .case_checks_planar import check_planar
 from .case_faults import Fault, shown
-from .case_filament import Circle, End, Filament, Helix
+from .case_filament import Circle, End, Filament, Helix, TwoWell
 from .case_schema import Scene
 from .expressions import Expression, ExpressionError
 
@@ -20,6 +20,7 @@ def check_filament(name: str, filament: Filament, case: Scene) -> Iterator[Fault
     key = f"filament.{name}"
     yield from _numbers(key, filament)
     yield from _moduli(key, filament)
+    yield from _law(f"{key}.law", filament)
     yield from _place(key, filament)
     yield from _shape(key, filament)
     yield from _end(f"{key}.start", filament.start)
@@ -68,6 +69,16 @@ def _moduli(key: str, filament: Filament) -> Iterator[Fault]:
         found = _least(expression, filament.length)
         if isinstance(found, str):
             yield Fault(f"{key}.{name}", found, "a number along the whole filament", reads)
+
+
+def _law(key: str, filament: Filament) -> Iterator[Fault]:
+    """Two wells are of the twist, and two."""
+    if not isinstance(filament.law, TwoWell):
+        return
+    if filament.twisting is None:
+        yield Fault(f"{key}.kind", '"two-well" and no twisting', "two preferred twists only with twisting")
+    if not filament.law.wells[0] < filament.law.wells[1]:
+        yield Fault(f"{key}.wells", shown(filament.law.wells), "[w1, w2] with w1 < w2")
 
 
 def _numbered(name: str, expressions: Sequence[Expression]) -> dict[str, Expression]:

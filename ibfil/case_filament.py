@@ -50,18 +50,25 @@ class Linear(Table):
 class Stiffening(Table):
     """A moment that grows faster than the strain."""
 
-    kind: Literal["stiffening"] = Field("stiffening", description="moment grows faster than the strain")
-    coefficient: Real = Field(description="size of the added term", examples=[1.0])
-    exponent: Positive = Field(description="power of the added term", examples=[3.0])
+    kind: Literal["stiffening"] = Field(
+        "stiffening", description="the linear moment times 1 + coefficient |excess strain|^exponent"
+    )
+    coefficient: Real = Field(description="size of the added term, length^exponent", examples=[1.0])
+    exponent: Positive = Field(description="power of the excess strain in it", examples=[2.0])
 
 
 class TwoWell(Table):
-    """Two preferred strains with a barrier between them."""
+    """Two preferred twists with a barrier between them; the modulus ``twisting`` is then not used."""
 
-    kind: Literal["two-well"] = Field("two-well", description="two preferred strains")
-    wells: Range = Field(description="the two preferred strains", examples=[[-1.0, 1.0]])
+    kind: Literal["two-well"] = Field(
+        "two-well", description="two preferred twists instead of one; needs twisting, whose number is then not used"
+    )
+    wells: Range = Field(description="the two preferred values of Omega3 - twist_rate", examples=[[-1.0, 1.0]])
     barrier: Positive = Field(description="energy per length between the wells", examples=[1.0])
-    gradient: NotNegative = Field(description="energy of a change of well along s", examples=[0.1])
+    gradient: NotNegative = Field(
+        description="g in the energy g/2 (dOmega3/ds)^2 per length; a wall is (w2 - w1) sqrt(g/(8 barrier)) wide",
+        examples=[0.1],
+    )
 
 
 Law = Annotated[

@@ -169,9 +169,7 @@ def carried_frame(slope: np.ndarray) -> np.ndarray:
     e1 = np.empty_like(tangent)
     e1[0] = perpendicular(own, tangent[0])
     for i in range(len(tangent) - 1):
-        e1[i + 1 : i + 2], left = carry(
-            e1[i : i + 1], tangent[i : i + 1], tangent[i + 1 : i + 2], np.zeros(1)
-        )
+        e1[i + 1 : i + 2], left = carry(e1[i : i + 1], tangent[i : i + 1], tangent[i + 1 : i + 2], np.zeros(1))
         if left < 1e-6:
             raise ValueError(f"the tangent reverses between nodes {i} and {i + 1}")
     return e1

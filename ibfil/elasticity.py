@@ -22,8 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from .geometry import Geometry
+from .geometry import D1, D2, E1, E2, E3, GAP, LENGTH, O1, O2, SPEED, Geometry
 from .rods import Mesh
+from .vectors import NOT_NEGATIVE, at, cross, dot, mix, plus, put, scaled
 
 
 class Moment(NamedTuple):
@@ -36,228 +37,304 @@ class Moment(NamedTuple):
 
 
 @njit(cache=True)
-def _cross(a, b, out):
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
+def release(nodes, bend, bend_slope):
+    """Zeroes M1, M2 (n, 2) and their slopes (n, 2, 2) at the ``nodes`` (k,), ends that carry no moment."""
+    for k in range(nodes.size):
+        bend[nodes[k]] = 0.0
+        bend_slope[nodes[k]] = 0.0
 
 
-@njit(cache=True)
-def nodal_force(mesh: Mesh, g: Geometry, moment: Moment, stretching, force):
+def nodal_force(mesh: Mesh, g: Geometry, moment: Moment, stretching: np.ndarray, force: np.ndarray) -> None:
     """Eq. 44: adds the elastic force on each node, (n, 3), and where ``force`` is (n, 4) the twist torque.
 
     ``stretching`` (n,) is EA at half nodes. The force is the rod's on the fluid.
     """
+    _nodal_force(mesh.joined, mesh.ds, mesh.volume, g.table, moment.bend, moment.twist, stretching, force)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _nodal_force(joined, rest, volume, g, bend, twist, stretching, force):
     n, m = force.shape
-    before, after = np.empty(3), np.empty(3)
     for i in range(n - 1):
-        if not mesh.joined[i]:
+        if not joined[i]:
             continue
-        ds, m3, j = mesh.ds[i], moment.twist[i], i + 1
-        p = 0.0
-        for a in range(2):
-            p += 0.5 * (moment.bend[i, a] * g.bend[i, a] + moment.bend[j, a] * g.bend[j, a])
-        tension = stretching[i] * (1.0 - ds / g.length[i]) - p
+        j, ds, m3 = i + 1, rest[i], twist[i]
+        p = bend[i, 0] * g[i, O1] + bend[i, 1] * g[i, O2] + bend[j, 0] * g[j, O1] + bend[j, 1] * g[j, O2]
+        tension = stretching[i] * (1.0 - ds / g[i, LENGTH]) - 0.5 * p
+        before = mix(bend[i, 0], at(g, i, E2), -bend[i, 1], at(g, i, E1))
+        after = mix(bend[j, 0], at(g, j, E2), -bend[j, 1], at(g, j, E1))
+        flux = mix(1.0 / ds, plus(after, -1.0, before), tension / ds, at(g, i, GAP))
         if m3 != 0.0:
-            _cross(g.d1[i], g.d2[i], before)
-            _cross(g.d1[j], g.d2[j], after)
-        else:
-            before[:] = 0.0
-            after[:] = 0.0
-        for c in range(3):
-            q = moment.bend[j, 0] * g.e2[j, c] - moment.bend[j, 1] * g.e1[j, c]
-            q -= moment.bend[i, 0] * g.e2[i, c] - moment.bend[i, 1] * g.e1[i, c]
-            flux = (q + tension * g.gap[i, c]) / ds + 0.5 * m3 * (before[c] + after[c])
-            force[i, c] += flux
-            force[j, c] -= flux
+            flux = plus(flux, 0.5 * m3, cross(at(g, i, D1), at(g, i, D2)))
+            flux = plus(flux, 0.5 * m3, cross(at(g, j, D1), at(g, j, D2)))
+        put(force, i, 0, plus(at(force, i, 0), 1.0, flux))
+        put(force, j, 0, plus(at(force, j, 0), -1.0, flux))
         if m == 4:
             force[i, 3] += m3
             force[j, 3] -= m3
     if m == 4:
         for i in range(n):
-            force[i, 3] += mesh.volume[i] * (
-                g.bend[i, 0] * moment.bend[i, 1] - g.bend[i, 1] * moment.bend[i, 0]
-            )
+            force[i, 3] += volume[i] * (g[i, O1] * bend[i, 1] - g[i, O2] * bend[i, 0])
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def stiffness(mesh: Mesh, g: Geometry, moment: Moment, stretching, old, clip, unit, reach, matrix):
-    """The exact Jacobian of ``nodal_force``, added to ``matrix`` (n, m, (2 w + 1) m): node rows, columns from i - w.
+class _Node(NamedTuple):
+    """What the stiffness needs of one node, in registers.
 
-    The unknowns of a node are its displacement and, where m = 4, the angle by which e1 is turned about the tangent
-    after it was carried (Eq. 41) from the tangents ``old`` (n, 3). So with dpsi = dphi + (e3 x old).de3/(1 + old.e3),
-
-        de1 = -(e1.de3) e3 + e2 dpsi,   de2 = -(e2.de3) e3 - e1 dpsi,   e_a.de3 = e_a.dr'/|r'|
-        dO1 = -e2.dr'' + (e3.r'')(e2.dr')/|r'| + O2 dpsi,   dO2 = e1.dr'' - (e3.r'')(e1.dr')/|r'| - O1 dpsi
-
-    Every node changes the flux on its left and on its right; each is written as a matrix on dr'', one on dr', one on
-    dpsi, and goes through the stencils into the rows on either side. ``clip``: the compressive part of F'3 is left
-    out of the matrix (never of the force), which makes a single linear solve robust.
-
-    ``unit`` and ``reach`` are tuples of m and of p m entries: their lengths are known when this is compiled, so that
-    the inner loops become straight vector code.
+    With x = dr'' - l dr', l = (e3.r'')/|r'|, and dpsi the turn of e1 about e3: dM1 = m1.x + m1_psi dpsi, and so on.
     """
-    n, m = matrix.shape[0], len(unit)
-    w = (matrix.shape[2] // m - 1) // 2
-    p = len(reach) // m
-    left, right = np.zeros(len(reach)), np.zeros(len(reach))
-    second, slope, spin = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((2, 4))
-    o2, o1, oa = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
-    m2, m1, ma = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
-    pp, ps, turn, x, y = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    source = np.empty((2, 3))
+
+    e1: tuple[float, float, float]
+    e2: tuple[float, float, float]
+    e3: tuple[float, float, float]
+    d1: tuple[float, float, float]
+    d2: tuple[float, float, float]
+    short: float  # 1/|r'|
+    along: float  # l
+    turn: tuple[float, float, float]  # dpsi = dphi + turn.dr'
+    moment: tuple[float, float]  # M1, M2
+    m1: tuple[float, float, float]
+    m2: tuple[float, float, float]
+    p: tuple[float, float, float]
+    m1_psi: float
+    m2_psi: float
+    p_psi: float
+
+
+class _Row(NamedTuple):
+    """A number as it follows one node: second.dr'' + slope.dr' + psi dphi."""
+
+    second: tuple[float, float, float]
+    slope: tuple[float, float, float]
+    psi: float
+
+
+@njit(cache=True, inline="always")
+def _node(g, bend, bend_slope, old, i):
+    """How node i changes: dO1 = -e2.x + O2 dpsi, dO2 = e1.x - O1 dpsi; the law's slopes; dP = O.dM + M.dO."""
+    e1, e2, e3, d1, d2 = at(g, i, E1), at(g, i, E2), at(g, i, E3), at(g, i, D1), at(g, i, D2)
+    o1, o2, m1, m2 = g[i, O1], g[i, O2], bend[i, 0], bend[i, 1]
+    s11, s12, s21, s22 = bend_slope[i, 0, 0], bend_slope[i, 0, 1], bend_slope[i, 1, 0], bend_slope[i, 1, 1]
+    x1, x2 = mix(-s11, e2, s12, e1), mix(-s21, e2, s22, e1)
+    t1, t2 = s11 * o2 - s12 * o1, s21 * o2 - s22 * o1
+    p = plus(plus(mix(o1, x1, o2, x2), -m1, e2), m2, e1)
+    p_psi = o1 * t1 + o2 * t2 + m1 * o2 - m2 * o1
+    short, before = 1.0 / g[i, SPEED], at(old, i, E3)
+    turn = scaled(short / (1.0 + dot(before, e3)), cross(e3, before))
+    return _Node(e1, e2, e3, d1, d2, short, short * dot(e3, d2), turn, (m1, m2), x1, x2, p, t1, t2, p_psi)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _flux(a, f, gap, c):
+    """Component c of f Q - P gap/2 as it follows node ``a``.
+
+    dQ = e2 dM1 - e1 dM2 - e3 [M1 (e2.dr') - M2 (e1.dr')]/|r'| - (M1 e1 + M2 e2) dpsi
+    """
+    b1, b2, b3, half = f * a.e1[c], f * a.e2[c], f * a.e3[c] * a.short, -0.5 * gap[c]
+    second = plus(mix(b2, a.m1, -b1, a.m2), half, a.p)
+    psi = b2 * (a.m1_psi - a.moment[1]) - b1 * (a.m2_psi + a.moment[0]) + half * a.p_psi
+    slope = plus(mix(-a.along, second, psi, a.turn), -b3 * a.moment[0], a.e2)
+    return _Row(second, plus(slope, b3 * a.moment[1], a.e1), psi)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _twist(a, b, f):
+    """f dO3 ds as it follows node ``a`` of a segment, ``b`` the other one; f is negative where a comes first.
+
+    dO3 = 1/(2 ds) { [-(e3_a.e1_b) e2_a + (e2_b.e3_a) e1_a].dr'_a/|r'_a|
+                   + [-(e2_a.e3_b) e1_b + (e3_b.e1_a) e2_b].dr'_b/|r'_b|
+                   + (e1_a.e1_b + e2_a.e2_b)(dpsi_b - dpsi_a) },     a before b
+    """
+    h = 0.5 * f
+    psi = h * (dot(a.e1, b.e1) + dot(a.e2, b.e2))
+    slope = mix(h * a.short * dot(a.e3, b.e1), a.e2, -h * a.short * dot(a.e3, b.e2), a.e1)
+    return _Row((0.0, 0.0, 0.0), plus(slope, psi, a.turn), psi)
+
+
+@njit(cache=True)
+def _unit(c):
+    return 1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _twisted(a, m3, x, twist, c):
+    """Component c of M3 (X_i + X_{i+1})/2 as it follows node ``a``: dX = r' x dr'' - r'' x dr'; ``x`` the mean X."""
+    i, j = (c + 1) % 3, (c + 2) % 3
+    u, v, h = _unit(i), _unit(j), 0.5 * m3
+    second, slope = mix(h * a.d1[i], v, -h * a.d1[j], u), mix(h * a.d2[j], u, -h * a.d2[i], v)
+    return _Row(second, plus(slope, x[c], twist.slope), x[c] * twist.psi)
+
+
+class Stencils(NamedTuple):
+    """The stencils of r'' and r' at nodes i - 1, i and i + 1, side by side for the row of node i."""
+
+    start: np.ndarray  # (n,) the first node of any of them
+    reach: np.ndarray  # (n,) how many nodes they take in together
+    weights: np.ndarray  # (n, most, 6) r'' and r' of i - 1, then of i, then of i + 1; zero across a gap between rods
+
+
+def stencils(mesh: Mesh) -> Stencils:
+    """The mesh's stencils, three by three."""
+    n, p = mesh.w1.shape
+    beside = [[k for k in (i - 1, i, i + 1) if k == i or (0 <= k < n and mesh.joined[min(i, k)])] for i in range(n)]
+    start = np.array([min(mesh.first[k] for k in nodes) for nodes in beside])
+    reach = np.array([max(mesh.first[k] for k in nodes) + p for nodes in beside]) - start
+    weights = np.zeros((n, reach.max(), 6))
+    for i, nodes in enumerate(beside):
+        for k in nodes:
+            at = slice(mesh.first[k] - start[i], mesh.first[k] - start[i] + p)
+            weights[i, at, 2 * (k - i + 1)] = mesh.w2[k]
+            weights[i, at, 2 * (k - i + 1) + 1] = mesh.w1[k]
+    return Stencils(start, reach, weights)
+
+
+@njit(cache=True, inline="always")
+def _triple(flux, i, side, c, k):
+    return flux[i, side, c, k], flux[i, side, c, k + 1], flux[i, side, c, k + 2]
+
+
+@njit(cache=True, inline="always")
+def _add(row, flux, i, side, c):
+    """Adds to component c of the flux right of node i as it follows its left (side 0) or right (1) node."""
+    for k in range(3):
+        flux[i, side, c, k] += row.second[k]
+        flux[i, side, c, 3 + k] += row.slope[k]
+    flux[i, side, c, 6] += row.psi
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux):
+    """Adds how f Q - P d/2 of every segment changes to ``flux`` (n, 2, m, 7)."""
+    after = _node(g, bend, bend_slope, old, 0)
+    for i in range(flux.shape[0] - 1):
+        here, after = after, _node(g, bend, bend_slope, old, i + 1)
+        if joined[i]:
+            f = 1.0 / rest[i]
+            gap = scaled(f, at(g, i, GAP))
+            for c in range(3):
+                _add(_flux(here, -f, gap, c), flux, i, 0, c)
+                _add(_flux(after, f, gap, c), flux, i, 1, c)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _twist_fluxes(joined, rest, g, bend, bend_slope, twist, twist_slope, old, flux):
+    """Adds how M3 (X_i + X_{i+1})/2 and, to the torques, M3 of every segment change."""
+    after = _node(g, bend, bend_slope, old, 0)
+    for i in range(flux.shape[0] - 1):
+        here, after = after, _node(g, bend, bend_slope, old, i + 1)
+        if joined[i]:
+            f, x = twist_slope[i] / rest[i], mix(0.5, cross(here.d1, here.d2), 0.5, cross(after.d1, after.d2))
+            left, right = _twist(here, after, -f), _twist(after, here, f)
+            for c in range(3):
+                _add(_twisted(here, twist[i], x, left, c), flux, i, 0, c)
+                _add(_twisted(after, twist[i], x, right, c), flux, i, 1, c)
+            _add(left, flux, i, 0, 3)
+            _add(right, flux, i, 1, 3)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _rows(stencils: Stencils, flux, matrix):
+    """Adds F_{i+1/2} - F_{i-1/2} to row i of ``matrix`` (n, m, 2 w + 1, m): flux[i + 1] less flux[i].
+
+    They follow three nodes, i - 1 by p, i by q and i + 1 by r, through the stencils of these.
+    """
+    n, m, nodes = matrix.shape[:3]
+    w, weights = nodes // 2, stencils.weights
     for i in range(n):
-        e1, e2, e3, r1, r2 = g.e1[i], g.e2[i], g.e3[i], g.d1[i], g.d2[i]
-        b1, b2 = g.bend[i, 0], g.bend[i, 1]
-        k1, k2 = moment.bend[i, 0], moment.bend[i, 1]
-        q = 1.0 / g.speed[i]
-        along = (e3[0] * r2[0] + e3[1] * r2[1] + e3[2] * r2[2]) * q
-        _cross(e3, old[i], turn)
-        one = 1.0 + old[i, 0] * e3[0] + old[i, 1] * e3[1] + old[i, 2] * e3[2]
-        oa[0], oa[1] = b2, -b1
-        for c in range(3):
-            turn[c] *= q / one
-            o2[0, c], o2[1, c] = -e2[c], e1[c]
-            o1[0, c], o1[1, c] = along * e2[c], -along * e1[c]
-        for a in range(2):
-            s0, s1 = moment.bend_slope[i, a, 0], moment.bend_slope[i, a, 1]
-            ma[a] = s0 * oa[0] + s1 * oa[1]
-            for c in range(3):
-                m2[a, c] = s0 * o2[0, c] + s1 * o2[1, c]
-                m1[a, c] = s0 * o1[0, c] + s1 * o1[1, c]
-        # dP = dM.O + M.dO
-        pa = ma[0] * b1 + k1 * oa[0] + ma[1] * b2 + k2 * oa[1]
-        for c in range(3):
-            pp[c] = m2[0, c] * b1 + k1 * o2[0, c] + m2[1, c] * b2 + k2 * o2[1, c]
-            ps[c] = m1[0, c] * b1 + k1 * o1[0, c] + m1[1, c] * b2 + k2 * o1[1, c]
-        for side in range(2):  # 0: the flux at i - 1/2, 1: the flux at i + 1/2
-            h = i - 1 + side
-            if h < 0 or not mesh.joined[h]:
-                second[side] = 0.0
-                slope[side] = 0.0
-                spin[side] = 0.0
-                continue
-            sign = 1.0 if side == 0 else -1.0
-            inv, m3 = 1.0 / mesh.ds[h], moment.twist[h]
-            for a in range(3):
-                da = 0.5 * g.gap[h, a]
-                tw = (k1 * e1[a] + k2 * e2[a]) * sign
-                spin[side, a] = inv * (sign * (ma[0] * e2[a] - ma[1] * e1[a]) - tw - da * pa)
-                for c in range(3):
-                    # dQ = dM1 e2 - dM2 e1 - e3 [M1 (e2.dr') - M2 (e1.dr')]/|r'| - (M1 e1 + M2 e2) dpsi
-                    dq2 = m2[0, c] * e2[a] - m2[1, c] * e1[a]
-                    dq1 = m1[0, c] * e2[a] - m1[1, c] * e1[a] - e3[a] * q * (k1 * e2[c] - k2 * e1[c])
-                    second[side, a, c] = inv * (sign * dq2 - da * pp[c])
-                    slope[side, a, c] = inv * (sign * dq1 - da * ps[c])
-            if m3 != 0.0:
-                # M3 dX/2,  dX = r' x dr'' - r'' x dr'
-                for v, f, into in ((r1, 0.5 * m3, second[side]), (r2, -0.5 * m3, slope[side])):
-                    into[0, 1] -= f * v[2]
-                    into[0, 2] += f * v[1]
-                    into[1, 0] += f * v[2]
-                    into[1, 2] -= f * v[0]
-                    into[2, 0] -= f * v[1]
-                    into[2, 1] += f * v[0]
+        start = (stencils.start[i] - i + w) & NOT_NEGATIVE
+        for c in range(m):
+            p0, p1, p2 = scaled(-1.0, _triple(flux, i, 0, c, 0))
+            p3, p4, p5 = scaled(-1.0, _triple(flux, i, 0, c, 3))
+            q0, q1, q2 = plus(_triple(flux, i + 1, 0, c, 0), -1.0, _triple(flux, i, 1, c, 0))
+            q3, q4, q5 = plus(_triple(flux, i + 1, 0, c, 3), -1.0, _triple(flux, i, 1, c, 3))
+            r0, r1, r2 = _triple(flux, i + 1, 1, c, 0)
+            r3, r4, r5 = _triple(flux, i + 1, 1, c, 3)
+            for j in range(stencils.reach[i]):
+                u0, u1, u2 = weights[i, j, 0], weights[i, j, 1], weights[i, j, 2]
+                u3, u4, u5 = weights[i, j, 3], weights[i, j, 4], weights[i, j, 5]
+                matrix[i, c, start + j, 0] += p0 * u0 + p3 * u1 + q0 * u2 + q3 * u3 + r0 * u4 + r3 * u5
+                matrix[i, c, start + j, 1] += p1 * u0 + p4 * u1 + q1 * u2 + q4 * u3 + r1 * u4 + r4 * u5
+                matrix[i, c, start + j, 2] += p2 * u0 + p5 * u1 + q2 * u2 + q5 * u3 + r2 * u4 + r5 * u5
             if m == 4:
-                _twist_flux(g, moment.twist_slope[h] * inv, h, side, second[side], slope[side], spin[side], x, y)
-        if m == 4:
-            # Lc d(O1 M2 - O2 M1)
-            lc = mesh.volume[i]
-            sa = lc * (oa[0] * k2 + b1 * ma[1] - oa[1] * k1 - b2 * ma[0])
-            for c in range(3):
-                source[0, c] = lc * (o2[0, c] * k2 + b1 * m2[1, c] - o2[1, c] * k1 - b2 * m2[0, c])
-                source[1, c] = lc * (o1[0, c] * k2 + b1 * m1[1, c] - o1[1, c] * k1 - b2 * m1[0, c]) + sa * turn[c]
-            matrix[i, 3, w * 4 + 3] += sa
-        for side in range(2):
-            for a in range(m):
-                for c in range(3):
-                    slope[side, a, c] += spin[side, a] * turn[c]
-        here = (mesh.first[i] - i + w) * m
-        before, after = i > 0 and mesh.joined[i - 1], mesh.joined[i]
-        for a in range(m):
-            for k in range(p):
-                u, v = mesh.w2[i, k], mesh.w1[i, k]
-                for c in range(3):
-                    left[k * m + c] = second[0, a, c] * u + slope[0, a, c] * v
-                    right[k * m + c] = second[1, a, c] * u + slope[1, a, c] * v
-            row = matrix[i, a]
-            for k in range(len(reach)):
-                row[here + k] += right[k] - left[k]
-            if before:
-                row = matrix[i - 1, a]
-                for k in range(len(reach)):
-                    row[here + m + k] += left[k]
-            if after:
-                row = matrix[i + 1, a]
-                for k in range(len(reach)):
-                    row[here - m + k] -= right[k]
-        if m == 4:
-            for k in range(p):
-                for c in range(3):
-                    matrix[i, 3, here + 4 * k + c] += source[0, c] * mesh.w2[i, k] + source[1, c] * mesh.w1[i, k]
-        if m == 4:
-            for a in range(4):
-                matrix[i, a, w * 4 + 3] += spin[1, a] - spin[0, a]
-                if i > 0 and mesh.joined[i - 1]:
-                    matrix[i - 1, a, (w + 1) * 4 + 3] += spin[0, a]
-                if mesh.joined[i]:
-                    matrix[i + 1, a, (w - 1) * 4 + 3] -= spin[1, a]
-    _tension_stiffness(mesh, g, moment, stretching, clip, matrix)
+                matrix[i, c, w - 1, 3] -= flux[i, 0, c, 6]
+                matrix[i, c, w, 3] += flux[i + 1, 0, c, 6] - flux[i, 1, c, 6]
+                matrix[i, c, w + 1, 3] += flux[i + 1, 1, c, 6]
 
 
-@njit(cache=True)
-def _twist_flux(g, c_over_ds, h, side, second, slope, spin, x, y):
-    """The part of the two twist fluxes at h + 1/2 (force and torque) that comes through dO3, from one of its nodes.
-
-    dO3_{h+1/2} = 1/(2 ds) { [-(e3_a.e1_b) e2_a + (e2_b.e3_a) e1_a].dr'_a/|r'_a|
-                           + [-(e2_a.e3_b) e1_b + (e3_b.e1_a) e2_b].dr'_b/|r'_b|
-                           + (e1_a.e1_b + e2_a.e2_b)(dpsi_b - dpsi_a) },     a = h, b = h + 1
-    """
-    a, b = h, h + 1
-    t1, t2, cc = 0.0, 0.0, 0.0
-    for c in range(3):
-        cc += g.e1[a, c] * g.e1[b, c] + g.e2[a, c] * g.e2[b, c]
-        if side == 1:
-            t1 -= g.e3[a, c] * g.e1[b, c]
-            t2 += g.e2[b, c] * g.e3[a, c]
-        else:
-            t1 += g.e3[b, c] * g.e1[a, c]
-            t2 -= g.e2[a, c] * g.e3[b, c]
-    i = a if side == 1 else b
-    f = 0.5 * c_over_ds
-    if side == 1:
-        cc = -cc
-    _cross(g.d1[a], g.d2[a], x)
-    _cross(g.d1[b], g.d2[b], y)
-    for r in range(4):
-        row = f if r == 3 else 0.5 * f * (x[r] + y[r])
-        if r == 3:
-            second[3, 0] = second[3, 1] = second[3, 2] = 0.0
-            slope[3, 0] = slope[3, 1] = slope[3, 2] = 0.0
-            spin[3] = 0.0
-        for c in range(3):
-            slope[r, c] += row * (t1 * g.e2[i, c] + t2 * g.e1[i, c]) / g.speed[i]
-        spin[r] += row * cc
-
-
-@njit(cache=True)
-def _tension_stiffness(mesh, g, moment, stretching, clip, matrix):
-    """d(F'3 d/ds) = [ (EA/|d|) u u^T + (F'3/ds) 1 ] d(dr),  u = d/|d|  (the part through P is in ``stiffness``)."""
-    n, m = matrix.shape[:2]
-    w = (matrix.shape[2] // m - 1) // 2
-    for i in range(n - 1):
-        if not mesh.joined[i]:
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _tension(joined, rest, g, bend, stretching, clip, matrix):
+    """Adds d(F'3 d/ds) = [ (EA/|d|) u u^T + (F'3/ds) 1 ] d(dr),  u = d/|d|; the part through P is in the fluxes."""
+    w = matrix.shape[2] // 2
+    for i in range(matrix.shape[0] - 1):
+        if not joined[i]:
             continue
-        j, ds, length = i + 1, mesh.ds[i], g.length[i]
-        f = stretching[i] * (1.0 - ds / length)
-        for a in range(2):
-            f -= 0.5 * (moment.bend[i, a] * g.bend[i, a] + moment.bend[j, a] * g.bend[j, a])
-        f = (max(f, 0.0) if clip else f) / ds
+        j, ds, length, gap = i + 1, rest[i], g[i, LENGTH], at(g, i, GAP)
+        p = bend[i, 0] * g[i, O1] + bend[i, 1] * g[i, O2] + bend[j, 0] * g[j, O1] + bend[j, 1] * g[j, O2]
+        tension = stretching[i] * (1.0 - ds / length) - 0.5 * p
+        tension = (max(tension, 0.0) if clip else tension) / ds
         axial = stretching[i] / length**3
         for a in range(3):
             for c in range(3):
-                b = axial * g.gap[i, a] * g.gap[i, c] + (f if a == c else 0.0)
-                matrix[i, a, w * m + c] -= b
-                matrix[i, a, (w + 1) * m + c] += b
-                matrix[j, a, w * m + c] -= b
-                matrix[j, a, (w - 1) * m + c] += b
+                b = axial * gap[a] * gap[c] + (tension if a == c else 0.0)
+                matrix[i, a, w, c] -= b
+                matrix[i, a, w + 1, c] += b
+                matrix[j, a, w, c] -= b
+                matrix[j, a, w - 1, c] += b
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _twist_sources(mesh: Mesh, g, bend, bend_slope, old, matrix):
+    """Adds how Lc (O1 M2 - O2 M1) of every node changes to the rows of torques."""
+    w = matrix.shape[2] // 2
+    for i in range(matrix.shape[0]):
+        a, lc, o1, o2 = _node(g, bend, bend_slope, old, i), mesh.volume[i], g[i, O1], g[i, O2]
+        m1, m2 = a.moment
+        second = plus(plus(mix(lc * o1, a.m2, -lc * o2, a.m1), -lc * m2, a.e2), -lc * m1, a.e1)
+        psi = lc * (o1 * a.m2_psi - o2 * a.m1_psi + m2 * o2 + m1 * o1)
+        slope = mix(-a.along, second, psi, a.turn)
+        for k in range(mesh.w1.shape[1]):
+            d = mix(mesh.w2[i, k], second, mesh.w1[i, k], slope)
+            for c in range(3):
+                matrix[i, 3, mesh.first[i] + k - i + w, c] += d[c]
+        matrix[i, 3, w, 3] += psi
+
+
+@njit(cache=True)
+def _stiffness(joined, rest, stencils: Stencils, g, bend, bend_slope, stretching, old, clip, flux, matrix):
+    """The stiffness but for what is special to rods that twist; ``flux`` comes with what M3 adds to it, or zeros."""
+    n, m, columns = matrix.shape
+    by_node = matrix.reshape(n, m, columns // m, m)
+    _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux[1:])
+    _rows(stencils, flux, by_node)
+    _tension(joined, rest, g, bend, stretching, clip, by_node)
+
+
+def stiffness(
+    mesh: Mesh,
+    stencils: Stencils,
+    g: Geometry,
+    start: Geometry,
+    moment: Moment,
+    stretching: np.ndarray,
+    clip: bool,
+    matrix: np.ndarray,
+) -> None:
+    """Adds the exact Jacobian of ``nodal_force`` to ``matrix`` (n, m, (2 w + 1) m) of zeros: columns from node i - w.
+
+    The unknowns of a node are its displacement from ``start`` and, where m = 4, the angle by which e1 is turned about
+    the tangent after it was carried (Eq. 41). So with dpsi = dphi + (e3 x old).de3/(1 + old.e3), old = e3 of ``start``,
+
+        de1 = -(e1.de3) e3 + e2 dpsi,   de2 = -(e2.de3) e3 - e1 dpsi,   e_a.de3 = e_a.dr'/|r'|
+        dO1 = -e2.x + O2 dpsi,   dO2 = e1.x - O1 dpsi,   x = dr'' - (e3.r'') dr'/|r'|
+
+    The flux through every face is first written as it follows the two nodes beside it, by dr'', dr' and dphi; these
+    then go through the stencils of the nodes. ``clip``: the compressive part of F'3 is left out of the matrix (never
+    of the force), which makes a single linear solve robust.
+    """
+    n, m, columns = matrix.shape
+    flux = np.zeros((n + 1, 2, m, 7))
+    what = g.table, moment.bend, moment.bend_slope
+    if m == 4:
+        by_node = matrix.reshape(n, m, columns // m, m)
+        _twist_fluxes(mesh.joined, mesh.ds, *what, moment.twist, moment.twist_slope, start.table, flux[1:])
+        _twist_sources(mesh, *what, start.table, by_node)
+    _stiffness(mesh.joined, mesh.ds, stencils, *what, stretching, start.table, clip, flux, matrix)

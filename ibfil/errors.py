@@ -43,5 +43,9 @@ class RunFailed(Exception):
         return "\n".join(lines)
 
 
+class Stopped(Exception):
+    """A run that ends before its time because its case says so; the text is the reason (exit status 0)."""
+
+
 class Interrupted(Exception):
     """Ctrl-C or SIGTERM, raised between two steps (exit status 130)."""

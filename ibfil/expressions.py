@@ -148,9 +148,7 @@ class Expression:
         return partly
 
 
-def parse(
-    value: str | int | float, variables: Sequence[str] = (), parameters: Parameters | None = None
-) -> Expression:
+def parse(value: str | int | float, variables: Sequence[str] = (), parameters: Parameters | None = None) -> Expression:
     """The expression ``value``, in which ``variables``, the names of ``parameters`` and pi may stand.
 
     Raises ExpressionError: not an expression, too long or too deep, a name that is not known, a constant part
@@ -205,9 +203,7 @@ def _syntax(text: str) -> ast.expr:
     count, layer = 0, [tree]
     for _ in range(MAX_DEPTH):
         count += len(layer)
-        layer = [
-            child for node in layer for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)
-        ]
+        layer = [child for node in layer for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
     if layer:
         raise ExpressionError(f"nested more than {MAX_DEPTH} deep (a sum of n terms counts n)")
     if count > MAX_NODES:
@@ -244,9 +240,7 @@ def _read(node: ast.AST, variables: Sequence[str], parameters: Parameters) -> Tr
             return (name, *map(read, args))
         case ast.Compare():
             raise ExpressionError("a comparison stands only as the first argument of where")
-    raise ExpressionError(
-        "only numbers, names, + - * / **, brackets and calls of known functions are allowed"
-    )
+    raise ExpressionError("only numbers, names, + - * / **, brackets and calls of known functions are allowed")
 
 
 def _name(name: str, variables: Sequence[str], parameters: Parameters) -> Tree:
@@ -316,9 +310,7 @@ def _apply(op: str, values: list[float]) -> float:
     except (ValueError, ZeroDivisionError, OverflowError):
         result = math.nan
     if not math.isfinite(result):
-        shown = (
-            f" {op} ".join(f"{v:.6g}" for v in values) if op in _BINARY.values() else f"{op}({values[0]:.6g})"
-        )
+        shown = f" {op} ".join(f"{v:.6g}" for v in values) if op in _BINARY.values() else f"{op}({values[0]:.6g})"
         raise ExpressionError(f"{shown} has no finite value")
     return result
 

@@ -35,19 +35,17 @@ class GridFields:
         t.real[:] = 0.0
         spread(base, weights, force, t.real)
         t.forward()
-        t.modes /= t.size * h**3
+        # Each field is transformed in the same room, so what they are made of is kept elsewhere.
+        modes = t.modes / (t.size * h**3)
         out = {}
         if "pressure" in names:
-            out["pressure"] = self._pressure(t.modes.copy())
+            out["pressure"] = self._pressure(modes)
         sx, sy, sz = self._squares
-        project(t.modes.view(float), *self._waves, sx, sy, np.repeat(sz, 2), 0.0, self.viscosity, 1.0)
-        modes = t.modes.copy()
+        project(modes.view(float), *self._waves, sx, sy, np.repeat(sz, 2), 0.0, self.viscosity, 1.0)
         if "velocity" in names:
             out["velocity"] = self._real(modes, self._background(time))
         if "vorticity" in names:
-            curl = np.stack(
-                [1j * (self._k[a] * modes[b] - self._k[b] * modes[a]) for a, b in ((1, 2), (2, 0), (0, 1))]
-            )
+            curl = np.stack([1j * (self._k[a] * modes[b] - self._k[b] * modes[a]) for a, b in ((1, 2), (2, 0), (0, 1))])
             out["vorticity"] = self._real(curl, self._background_curl(time))
         return out
 
@@ -66,9 +64,8 @@ class GridFields:
 
     def _points(self) -> np.ndarray:
         """Places (nx ny nz, 3) of the grid points."""
-        axes = [
-            origin + self.grid.spacing * np.arange(n) for origin, n in zip(self.grid.origin, self.grid.cells, strict=True)
-        ]
+        grid = self.grid
+        axes = [start + grid.spacing * np.arange(n) for start, n in zip(grid.origin, grid.cells, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
     def _background(self, time: float) -> np.ndarray | None:

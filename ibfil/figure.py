@@ -219,12 +219,20 @@ def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
     for name, column in list(run.observables.items())[:SERIES]:
         values = np.asarray(column)
         lines = {"": values} if values.ndim == 1 else dict(zip(AXES, values.T, strict=True))
-        series.append((name, run.units(f"observables/{name}"), lines))
+        series.append((_meaning(run, name), run.units(f"observables/{name}"), lines))
     for title, parts in DIAGNOSTICS.items():
         lines = {label: np.asarray(run.diagnostics[key]) for key, label in parts.items() if key in run.diagnostics}
         if lines:
             series.append((title, run.units(f"diagnostics/{next(iter(parts))}"), lines))
     return series
+
+
+def _meaning(run: RunFile, name: str) -> str:
+    """An observable's name and what its series is, which need not be the like of its summary: "speed: position"."""
+    words = run.description(f"observables/{name}").split(",")[0]
+    for filament in run.filaments:
+        words = words.removesuffix(f" of {filament}")
+    return textwrap.shorten(f"{name}: {words}", 60, placeholder=" ...")
 
 
 def _against_time(axes: Axes, run: RunFile, title: str, units: str, lines: dict[str, np.ndarray]) -> None:

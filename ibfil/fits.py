@@ -10,6 +10,18 @@ import numpy as np
 TURNING = 0.9  # of all turning must be one way for a motion to count as rotation
 PLANAR = 0.05  # an orbit whose axes are further apart than 1 : 20 is an oscillation in a plane
 HARMONICS = 3
+_TURNS = 6  # of fitting an ellipse and its growth in turn
+
+
+def trapezoid_weights(x: np.ndarray) -> np.ndarray:
+    """Half of each neighbouring interval (n,): with these the trapezoid rule is a sum."""
+    half = 0.5 * np.diff(x)
+    return np.append(half, 0.0) + np.append(0.0, half)
+
+
+def _shares(times: np.ndarray) -> np.ndarray:
+    """Share (T,) of each output in the whole time."""
+    return trapezoid_weights(times) / (times[-1] - times[0])
 
 
 def cut(times: np.ndarray, values: np.ndarray, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -35,14 +47,7 @@ def mean(times: np.ndarray, values: np.ndarray, start: float, end: float) -> np.
     ends = (at_time(times, values, x)[None] for x in (start, end))
     first, last = ends
     y = np.concatenate([first, values[inside], last])
-    return np.trapezoid(y, t, axis=0) / (end - start)
-
-
-def _shares(times: np.ndarray) -> np.ndarray:
-    """Share (T,) of each output in the whole time."""
-    half = 0.5 * np.diff(times)
-    share = np.append(half, 0.0) + np.append(0.0, half)
-    return share / share.sum()
+    return trapezoid_weights(t) @ y / (end - start)
 
 
 def axes_of_orbit(times: np.ndarray, xy: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,16 +121,22 @@ def angular_rate(times: np.ndarray, xy: np.ndarray) -> float:
 def turning_angle(times: np.ndarray, xy: np.ndarray) -> np.ndarray:
     """Angle (T,) of points (T, 2) about (0, 0), continuous, on an ellipse as on the circle it is drawn from.
 
-    The ellipse is the one x.Cx = 1 that fits the points best after exponential growth is taken out.
+    The ellipse is the one x.Cx = 1 that fits the points best after exponential growth is taken out; the growth is
+    that of the distance in units of the ellipse, so the two are found in turn.
     """
-    distance = np.maximum(np.linalg.norm(xy, axis=1), np.finfo(float).tiny)
-    unit = xy * np.exp(-slope(times, np.log(distance)) * (times - times[-1]))[:, None]
-    unit = unit / np.abs(unit).max()
-    products = np.column_stack([unit[:, 0] ** 2, 2 * unit[:, 0] * unit[:, 1], unit[:, 1] ** 2])
-    c = np.linalg.lstsq(products, np.ones(len(unit)), rcond=None)[0]
-    if c[0] > 0 and c[0] * c[2] > c[1] ** 2:
-        unit = unit @ np.linalg.cholesky([[c[0], c[1]], [c[1], c[2]]])
-    return np.unwrap(np.arctan2(unit[:, 1], unit[:, 0]))
+    unit = xy / np.abs(xy).max()
+    stretch = np.eye(2)
+    for _ in range(_TURNS):
+        distance = np.maximum(np.linalg.norm(unit @ stretch, axis=1), np.finfo(float).tiny)
+        growth_rate = slope(times, np.log(distance))
+        level = unit * np.exp(-growth_rate * (times - times[-1]))[:, None]
+        products = np.column_stack([level[:, 0] ** 2, 2 * level[:, 0] * level[:, 1], level[:, 1] ** 2])
+        c = np.linalg.lstsq(products, np.ones(len(unit)), rcond=None)[0]
+        if not (c[0] > 0 and c[0] * c[2] > c[1] ** 2):  # no ellipse
+            break
+        stretch = np.linalg.cholesky([[c[0], c[1]], [c[1], c[2]]])
+    turned = unit @ stretch
+    return np.unwrap(np.arctan2(turned[:, 1], turned[:, 0]))
 
 
 def oscillation(times: np.ndarray, values: np.ndarray) -> float:
@@ -139,7 +150,7 @@ def oscillation(times: np.ndarray, values: np.ndarray) -> float:
     total = times[-1] - times[0]
     t = times - times[0]
     guess = _spectral_peak(t, values)
-    count = int(min(HARMONICS, 0.8 * np.pi / (guess * np.diff(t).max()), (len(t) - 4) / 2))
+    count = int(min(HARMONICS, 0.8 * np.pi * (len(t) - 1) / (guess * total), (len(t) - 4) / 2))
     if count < 1:
         return float("nan")
 
@@ -150,9 +161,7 @@ def oscillation(times: np.ndarray, values: np.ndarray) -> float:
 
     bin_width = 2 * np.pi / total
     limits = ([max(guess - bin_width, 0.3 * bin_width), -50.0], [guess + bin_width, 50.0])
-    fit = least_squares(
-        residual, [guess, 0.0], bounds=limits, x_scale=[bin_width, 1.0], xtol=1e-13, ftol=1e-13
-    )
+    fit = least_squares(residual, [guess, 0.0], bounds=limits, x_scale=[bin_width, 1.0], xtol=1e-13, ftol=1e-13)
     rate = float(fit.x[0])
     crossings = np.count_nonzero(np.diff(np.sign(values - values.mean())))
     return rate if rate * total > 0.95 * 2 * np.pi and crossings > 1 else float("nan")

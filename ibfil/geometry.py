@@ -2,87 +2,144 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
+from .frame import carried
 from .rods import Mesh
+from .vectors import NOT_NEGATIVE, at, cross, dot, plus, put, scaled
+
+# Columns of a configuration's table: vectors of three, then numbers.
+R, E1, E2, E3, D1, D2, GAP = range(0, 21, 3)
+SPEED, O1, O2, O3, LENGTH = range(21, 26)
+_COLUMNS = 26
 
 
-class Geometry(NamedTuple):
-    """One configuration of n nodes. Half-node arrays are indexed by segment and zero where there is no segment."""
+class Geometry:
+    """One configuration of n nodes. Half-node values are indexed by segment and zero where there is no segment.
 
-    r: np.ndarray  # (n, 3) positions
-    e1: np.ndarray  # (n, 3) first director
-    e2: np.ndarray  # (n, 3) e3 x e1
-    e3: np.ndarray  # (n, 3) unit tangent r'/|r'|
-    speed: np.ndarray  # (n,) |r'|
-    d1: np.ndarray  # (n, 3) r'
-    d2: np.ndarray  # (n, 3) r''
-    bend: np.ndarray  # (n, 2) O1 = -e2.r'', O2 = e1.r''
-    twist: np.ndarray  # (n,) O3 at half nodes, Eq. 39
-    gap: np.ndarray  # (n, 3) d = r_{i+1} - r_i
-    length: np.ndarray  # (n,) |d|
+    It is one ``table`` (n, 26), a row a node: compiled functions take one array in place of eleven, whose handing over
+    would cost more than what is done with them. What is in it are its attributes, views of the columns.
+    """
+
+    __slots__ = ("table",)
+
+    def __init__(self, table: np.ndarray) -> None:
+        self.table = table
+
+    @classmethod
+    def of(cls, **parts: np.ndarray) -> Geometry:
+        """A configuration from all its attributes by name."""
+        out = cls(np.empty((len(parts["r"]), _COLUMNS)))
+        for name, part in parts.items():
+            getattr(out, name)[:] = part
+        return out
+
+    r = property(lambda self: self.table[:, R : R + 3], doc="(n, 3) positions")
+    e1 = property(lambda self: self.table[:, E1 : E1 + 3], doc="(n, 3) first director")
+    e2 = property(lambda self: self.table[:, E2 : E2 + 3], doc="(n, 3) e3 x e1")
+    e3 = property(lambda self: self.table[:, E3 : E3 + 3], doc="(n, 3) unit tangent r'/|r'|")
+    d1 = property(lambda self: self.table[:, D1 : D1 + 3], doc="(n, 3) r'")
+    d2 = property(lambda self: self.table[:, D2 : D2 + 3], doc="(n, 3) r''")
+    gap = property(lambda self: self.table[:, GAP : GAP + 3], doc="(n, 3) d = r_{i+1} - r_i")
+    speed = property(lambda self: self.table[:, SPEED], doc="(n,) |r'|")
+    bend = property(lambda self: self.table[:, O1 : O2 + 1], doc="(n, 2) O1 = -e2.r'', O2 = e1.r''")
+    twist = property(lambda self: self.table[:, O3], doc="(n,) O3 at half nodes, Eq. 39")
+    length = property(lambda self: self.table[:, LENGTH], doc="(n,) |d|; 1 where there is no segment")
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
+def _derivatives(mesh, g, i):
+    """r' and r'' at node i, from the positions in the table, through the stencils (Eq. 15)."""
+    d1, d2 = at(mesh.c1, i, 0), at(mesh.c2, i, 0)
+    first = mesh.first[i] & NOT_NEGATIVE
+    for k in range(mesh.w1.shape[1]):
+        r = at(g, first + k, R)
+        d1 = plus(d1, mesh.w1[i, k], r)
+        d2 = plus(d2, mesh.w2[i, k], r)
+    return d1, d2
+
+
+@njit(cache=True, error_model="numpy")
 def tangents(mesh: Mesh, r):
     """Unit tangents (n, 3) of the stencils, Eq. 15; NaN where r' vanishes."""
-    n, p = mesh.w1.shape
+    n = r.shape[0]
     e3 = np.empty((n, 3))
     for i in range(n):
-        x, y, z = mesh.c1[i, 0], mesh.c1[i, 1], mesh.c1[i, 2]
-        for k in range(p):
-            j, w = mesh.first[i] + k, mesh.w1[i, k]
-            x += w * r[j, 0]
-            y += w * r[j, 1]
-            z += w * r[j, 2]
-        f = 1.0 / np.sqrt(x * x + y * y + z * z)
-        e3[i, 0], e3[i, 1], e3[i, 2] = f * x, f * y, f * z
+        d1, _ = _derivatives(mesh, r, i)
+        put(e3, i, 0, scaled(1.0 / np.sqrt(dot(d1, d1)), d1))
     return e3
 
 
-@njit(cache=True)
-def measure(mesh: Mesh, r, e1):
-    """Strains and spacing of the configuration r, e1 (n, 3); e1 is taken as normal to the stencils' tangents.
+@njit(cache=True, inline="always")
+def _measure_node(g, i, d1, d2, e1):
+    """Writes the frame, r', r'' and the curvatures of a node: O1 = -e2.r'', O2 = e1.r''."""
+    speed = np.sqrt(dot(d1, d1))
+    e3 = d1[0] / speed, d1[1] / speed, d1[2] / speed
+    e2 = cross(e3, e1)
+    put(g, i, E1, e1)
+    put(g, i, E2, e2)
+    put(g, i, E3, e3)
+    put(g, i, D1, d1)
+    put(g, i, D2, d2)
+    g[i, SPEED], g[i, O1], g[i, O2] = speed, -dot(e2, d2), dot(e1, d2)
 
-    O1 = -e2.r'' and O2 = e1.r'' at nodes; O3 = (e2_i + e2_{i+1}).(e1_{i+1} - e1_i)/(2 ds) at half nodes (Eq. 39).
-    """
-    n, p = mesh.w1.shape
-    e2, e3, d1, d2 = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
-    speed, bend = np.empty(n), np.empty((n, 2))
-    for i in range(n):
-        x, y, z = mesh.c1[i, 0], mesh.c1[i, 1], mesh.c1[i, 2]
-        u, v, w = mesh.c2[i, 0], mesh.c2[i, 1], mesh.c2[i, 2]
-        for k in range(p):
-            j, a, b = mesh.first[i] + k, mesh.w1[i, k], mesh.w2[i, k]
-            x += a * r[j, 0]
-            y += a * r[j, 1]
-            z += a * r[j, 2]
-            u += b * r[j, 0]
-            v += b * r[j, 1]
-            w += b * r[j, 2]
-        q = np.sqrt(x * x + y * y + z * z)
-        d1[i, 0], d1[i, 1], d1[i, 2] = x, y, z
-        d2[i, 0], d2[i, 1], d2[i, 2] = u, v, w
-        speed[i] = q
-        x, y, z = x / q, y / q, z / q
-        e3[i, 0], e3[i, 1], e3[i, 2] = x, y, z
-        a0, a1, a2 = e1[i, 0], e1[i, 1], e1[i, 2]
-        b0, b1, b2 = y * a2 - z * a1, z * a0 - x * a2, x * a1 - y * a0
-        e2[i, 0], e2[i, 1], e2[i, 2] = b0, b1, b2
-        bend[i, 0] = -(b0 * u + b1 * v + b2 * w)
-        bend[i, 1] = a0 * u + a1 * v + a2 * w
-    twist, gap, length = np.zeros(n), np.zeros((n, 3)), np.ones(n)
-    for i in range(n - 1):
+
+@njit(cache=True, inline="always")
+def _measure_segments(mesh, g):
+    """Writes d, |d| and O3 = (e2_i + e2_{i+1}).(e1_{i+1} - e1_i)/(2 ds) (Eq. 39) of every segment."""
+    for i in range(g.shape[0]):
         if mesh.joined[i]:
-            s, o = 0.0, 0.0
-            for c in range(3):
-                g = r[i + 1, c] - r[i, c]
-                gap[i, c] = g
-                s += g * g
-                o += (e2[i, c] + e2[i + 1, c]) * (e1[i + 1, c] - e1[i, c])
-            length[i] = np.sqrt(s)
-            twist[i] = o / (2.0 * mesh.ds[i])
-    return Geometry(r, e1, e2, e3, speed, d1, d2, bend, twist, gap, length)
+            gap = plus(at(g, i + 1, R), -1.0, at(g, i, R))
+            turn = plus(at(g, i + 1, E1), -1.0, at(g, i, E1))
+            put(g, i, GAP, gap)
+            g[i, LENGTH] = np.sqrt(dot(gap, gap))
+            g[i, O3] = dot(plus(at(g, i, E2), 1.0, at(g, i + 1, E2)), turn) / (2.0 * mesh.ds[i])
+        else:
+            put(g, i, GAP, (0.0, 0.0, 0.0))
+            g[i, LENGTH], g[i, O3] = 1.0, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _measured(mesh: Mesh, r, e1):
+    n = r.shape[0]
+    g = np.empty((n, _COLUMNS))
+    for i in range(n):
+        put(g, i, R, at(r, i, 0))
+    for i in range(n):
+        d1, d2 = _derivatives(mesh, g, i)
+        _measure_node(g, i, d1, d2, at(e1, i, 0))
+    _measure_segments(mesh, g)
+    return g
+
+
+@njit(cache=True, error_model="numpy")
+def _moved(mesh: Mesh, start, y):
+    n, m = y.shape
+    g = np.empty((n, _COLUMNS))
+    least, where = 2.0, 0
+    for i in range(n):
+        put(g, i, R, plus(at(start, i, R), 1.0, at(y, i, 0)))
+    for i in range(n):
+        d1, d2 = _derivatives(mesh, g, i)
+        e3 = scaled(1.0 / np.sqrt(dot(d1, d1)), d1)
+        e1, one = carried(at(start, i, E1), at(start, i, E3), e3, y[i, 3] if m == 4 else 0.0)
+        if one < least or one != one:
+            least, where = one, i
+        _measure_node(g, i, d1, d2, e1)
+    _measure_segments(mesh, g)
+    return g, least, where
+
+
+def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Geometry:
+    """Strains and spacing of the configuration r, e1 (n, 3); e1 is taken as normal to the stencils' tangents."""
+    return Geometry(_measured(mesh, r, e1))
+
+
+def moved(mesh: Mesh, start: Geometry, y: np.ndarray) -> tuple[Geometry, float, int]:
+    """The configuration displaced by y (n, m) from ``start``, e1 carried along (Eq. 41) and, where m = 4, turned.
+
+    Also the smallest 1 + e3.e3' met, and its node: near zero a tangent has all but reversed.
+    """
+    table, least, where = _moved(mesh, start.table, y)
+    return Geometry(table), least, where

@@ -16,6 +16,29 @@ import numpy as np
 from numba import njit
 
 
+def smooth(n: int) -> bool:
+    """Whether n has no prime factors but 2, 3 and 5: sizes that FFTs like."""
+    for p in (2, 3, 5):
+        while n % p == 0:
+            n //= p
+    return n == 1
+
+
+def cells_for(box: Sequence[float], largest: float) -> tuple[int, int, int] | None:
+    """Cells of the largest spacing not above ``largest`` for which every axis has a smooth number of them.
+
+    None where no spacing within 20 % does.
+    """
+    n = max(1, int(np.ceil(box[0] / largest * (1 - 1e-12))))
+    while box[0] / n >= 0.8 * largest:
+        counts = [side * n / box[0] for side in box]
+        whole = [round(c) for c in counts]
+        if all(abs(c - k) < 1e-9 * k and smooth(k) for c, k in zip(counts, whole, strict=True)):
+            return whole[0], whole[1], whole[2]
+        n += 1
+    return None
+
+
 class Grid:
     """A periodic box (3,) of cubic cells: ``cells`` (3,), ``spacing`` h, ``origin`` of grid index (0, 0, 0)."""
 
@@ -43,39 +66,32 @@ class Grid:
         return ks, squares
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
 def project(modes, kx, ky, kz, sx, sy, sz, alpha, viscosity, scale):
     """In place: scale (alpha + eta k^2)^-1 (1 - k k/|k|^2), with the mean mode zero.
 
     ``modes`` (3, nx, ny, 2 (nz//2 + 1)) are complex modes seen as pairs of reals, and so ``kz``, ``sz`` come twice
-    each: the multipliers are real, and the loop over plain reals is what compilers turn into vector code.
+    each: the multipliers are real, and the loop over plain reals is what compilers turn into vector code, as long as
+    no division may raise (``error_model``) and zeros are a choice, not a branch.
     """
     nx, ny, nz = modes.shape[1:]
     for i in range(nx):
         for j in range(ny):
             a, b = kx[i], ky[j]
             s, d = alpha + viscosity * (sx[i] + sy[j]), a * a + b * b
-            u, v, w = modes[0, i, j], modes[1, i, j], modes[2, i, j]
-            if s == 0.0 or d == 0.0:  # some k may be zero here: guard the divisions
-                for k in range(nz):
-                    c = kz[k]
-                    square, total = d + c * c, s + viscosity * sz[k]
-                    f = scale / total if total != 0.0 else 0.0
-                    p = (a * u[k] + b * v[k] + c * w[k]) / square if square != 0.0 else 0.0
-                    u[k] = f * (u[k] - a * p)
-                    v[k] = f * (v[k] - b * p)
-                    w[k] = f * (w[k] - c * p)
-            else:
-                for k in range(nz):
-                    c = kz[k]
-                    f = scale / (s + viscosity * sz[k])
-                    p = (a * u[k] + b * v[k] + c * w[k]) / (d + c * c)
-                    u[k] = f * (u[k] - a * p)
-                    v[k] = f * (v[k] - b * p)
-                    w[k] = f * (w[k] - c * p)
-    for c in range(3):
-        modes[c, 0, 0, 0] = 0.0
-        modes[c, 0, 0, 1] = 0.0
+            for k in range(nz):
+                c = kz[k]
+                square, total = d + c * c, s + viscosity * sz[k]
+                u, v, w = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
+                f = scale / total if total != 0.0 else 0.0
+                p = (a * u + b * v + c * w) / square if square != 0.0 else 0.0
+                modes[0, i, j, k] = f * (u - a * p)
+                modes[1, i, j, k] = f * (v - b * p)
+                modes[2, i, j, k] = f * (w - c * p)
+    if sx[0] + sy[0] + sz[0] == 0.0:  # the mean mode is among these
+        for c in range(3):
+            modes[c, 0, 0, 0] = 0.0
+            modes[c, 0, 0, 1] = 0.0
 
 
 @njit(cache=True)

@@ -6,25 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import shapes, timescales
+from . import assemble, shapes, timescales
 
 if TYPE_CHECKING:
     from .simulation import Simulation
 
 NEAR = 0.8  # ds/h below which a nearly inextensible rod locks without slip (numerics.md, 4.3)
 CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the motion
+UNEVEN = 0.02  # scatter of a straight rod's drag over places and directions, above which it is no number
 FINE = 0.3  # omega dt up to which the default scheme was measured to be accurate
-
-
-def _softest(filament) -> float:
-    s = np.linspace(0.0, filament.length, 11)
-    return min(float(np.min(a.bind("s", "t")(s, 0.0))) for a in filament.bending)
+SOFT = 0.05  # mean square of a strain's thermal fluctuation (of stretch; of an angle between nodes): beyond, not small
+LONG = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
 
 
 def _rod(simulation: Simulation, filament) -> dict[str, float]:
     """Groups of one filament."""
     case, grid = simulation.case, simulation.grid
-    bending, length = _softest(filament), filament.length
+    bending, length = timescales.softest(filament), filament.length
     out: dict[str, float] = {}
     rate = max(simulation.driving_rates(), default=0.0)
     if rate:
@@ -32,6 +30,8 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
         out["omega dt"] = rate * simulation.step_length
     stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
     out["EA L^2/A"] = stretching * length**2 / bending
+    if case.thermal is not None and case.thermal.energy > 0:
+        out["A/(kT L)"] = bending / (case.thermal.energy * length)
     if grid is not None:
         from .kernels import KERNELS
 
@@ -42,6 +42,10 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
             out["wavelength/h"] = 2 * np.pi / wave / grid.spacing
     elif filament.radius is not None:
         out["a/L"] = float(np.max(filament.radius.bind("s", "t")(0.5 * length, 0.0))) / length
+    matched = assemble.matching(case, filament)
+    if matched is not None:
+        out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
+        out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
     return out
 
 
@@ -89,22 +93,87 @@ def warnings(simulation: Simulation) -> list[str]:
                 "meets its own periodic images; take a larger fluid.box"
             )
         if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * FINE:
+            out.append(f"time.step: omega dt = {found['omega dt']:.3g}; the schemes are accurate up to about {FINE}")
+        if found.get("matched scatter", 0.0) > UNEVEN:
             out.append(
-                f"time.step: omega dt = {found['omega dt']:.3g}; the schemes are accurate up to about {FINE}"
+                f"{key}: the drag of a straight rod differs by {found['matched scatter']:.2g} of itself between places "
+                "in a cell and directions: set fluid.slip = 0.01, or take a wider fluid.kernel or a larger fluid.box"
             )
         where = simulation.nodes(name)
         out += shapes.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
     return out + _of_run(simulation)
 
 
+def _of_noise(simulation: Simulation) -> list[str]:
+    """What thermal forces ask of the rods and of the step (derivations.md, section 5)."""
+    case = simulation.case
+    out: list[str] = []
+    if case.thermal is None or case.thermal.energy == 0:
+        return out
+    for name, filament in case.filaments.items():
+        if filament.derivative == 6:
+            out.append(
+                f"filament.{name}.derivative: stencils of order 6 are not thermal: their stiffness is not symmetric, "
+                "and curvatures have 0.83 (inside) and 1.39 (at the ends) of their variance; take 2"
+            )
+        out += _softness(f"filament.{name}", filament, case.thermal.energy)
+    return out + _of_noisy_step(simulation)
+
+
+def _softness(key: str, filament, energy: float) -> list[str]:
+    """Where a segment's own fluctuations are not small: <strain^2> = kT/(EA ds), <angle^2> = kT ds/A between two."""
+    out, ds = [], filament.length / (filament.nodes - 1)
+    s = np.linspace(0.0, filament.length, filament.nodes)
+
+    def square(modulus, size: float) -> float:
+        return energy * size / float(np.min(modulus.bind("s", "t")(s, 0.0)))
+
+    stretched = square(filament.stretching, 1 / ds)
+    if stretched > SOFT:
+        out.append(
+            f"{key}.stretching: segments fluctuate by {np.sqrt(stretched):.2g} of their length (rms): "
+            "take a larger one, or fewer nodes"
+        )
+    turned = {"bending": max(square(modulus, ds) for modulus in filament.bending)}
+    if filament.twisting is not None:
+        turned["twisting"] = square(filament.twisting, ds)
+    for kind, value in turned.items():
+        if value > SOFT:
+            out.append(
+                f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: more nodes"
+            )
+    return out
+
+
+def _of_noisy_step(simulation: Simulation) -> list[str]:
+    case, dt = simulation.case, simulation.step_length
+    out: list[str] = []
+    assert case.thermal is not None
+    stretch = simulation.thermal_stretch(dt)
+    if stretch > LONG:
+        out.append(
+            f"time.step: thermal kicks turn segments so far in a step that they stay {100 * stretch:.2g} % longer; "
+            "take a shorter one"
+        )
+    memory = dt**2 / (2 * simulation.explicit_limit())
+    if memory > max(0.1 * case.time.end, dt):
+        out.append(
+            f"time.step: with it the stiffest motions reach their thermal spread only in {memory:.2g}; "
+            "take a shorter one, or start from a shape that has it"
+        )
+    if case.thermal.directions == "xy" and np.max(np.abs(simulation.start.e3[:, 2])) > 1e-9:
+        out.append('thermal.directions: "xy" is meant for rods in a plane z = const, and these leave it')
+    return out
+
+
 def _of_run(simulation: Simulation) -> list[str]:
-    case, out = simulation.case, []
+    case, out = simulation.case, _of_noise(simulation)
     if case.time.scheme == "explicit" and case.time.step != "auto":
         limit = simulation.explicit_limit()
         if case.time.step > limit:
-            out.append(
-                f"time.step: {case.time.step:g} is above the explicit limit {limit:.3g}: this will diverge"
-            )
+            out.append(f"time.step: {case.time.step:g} is above the explicit limit {limit:.3g}: this will diverge")
+    if simulation.contacts:
+        out.append(f"contact: {simulation.contacts} pairs of segments touch at the start")
     pressure = back_pressure(simulation)
     if pressure is not None:
         shown = ", ".join(f"{p:.3g}" for p in pressure)
@@ -116,7 +185,7 @@ def _of_run(simulation: Simulation) -> list[str]:
 
 
 def back_pressure(simulation: Simulation) -> np.ndarray | None:
-    """The mean pressure gradient (3,) that a net force on a periodic box implies at the start; None if there is none."""
+    """The mean pressure gradient (3,) that a net force on a periodic box implies; None if there is none."""
     if simulation.grid is None:
         return None
     frame = simulation.frame()

@@ -183,7 +183,7 @@ def recover(path: Path, journal: Path) -> bool:
 
     A living writer is left alone (False). Raises OSError where the file may not be written.
     """
-    if not journal.exists() or journal.stat().st_size == 0:
+    if not journal.exists() or journal.stat().st_size == 0 or is_being_written(journal):
         return False
     try:
         file = JournaledFile(path, journal)

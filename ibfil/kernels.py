@@ -26,7 +26,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Kernel:
-    """One kernel. ``weights(x)``: phi at the distances x (..., P) of all P grid points from the node."""
+    """One kernel; ``weights(x)`` is phi at the distances x (..., P) of all P grid points from the node. Radii in h."""
 
     name: str
     points: int

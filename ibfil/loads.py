@@ -12,7 +12,7 @@ import numpy as np
 
 from .geometry import Geometry
 from .rods import Mesh
-from .variation import Variation
+from .variation import Variation, cross
 
 OfTime = Callable[[float], np.ndarray]
 
@@ -113,11 +113,13 @@ class ActiveMoment:
     """A moment per length along e1, e2, e3, ``parts(t)`` (n, 3) at all nodes; zero where there is none.
 
     It enters the force of Eq. 13 as e3 x m, at half nodes by the mean of the nodes, AND the spin of Eq. 36 as Lc m3.
+    The rod gets the moment m to second order in ds and first in the stretch, also where it is "torque-free".
     """
 
     def __init__(self, mesh: Mesh, parts: OfTime) -> None:
         self.mesh, self.parts = mesh, parts
-        self._nodes = np.arange(len(mesh.ds))
+        right, left = 0.5 * mesh.joined, 0.5 * np.append(False, mesh.joined[:-1])
+        self._into = ((right - left, 0, 1.0), (right, 1, -1.0), (left, -1, 1.0))
 
     def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
         """Fluxes (q_i + q_{i+1})/2, q = e3 x m = m1 e2 - m2 e1, and the torque Lc m3."""
@@ -131,13 +133,12 @@ class ActiveMoment:
 
     def add_stiffness(self, time: float, variation: Variation) -> None:
         """dq = m1 de2 - m2 de1, into the rows on either side of both segments of a node."""
-        m, joined = self.parts(time), self.mesh.joined
+        m = self.parts(time)
         crossed = np.column_stack([-m[:, 1], m[:, 0], np.zeros(len(m))])
-        half = 0.5 * np.broadcast_to(np.eye(3), (len(m), 3, 3))
-        right = self._nodes[joined]
-        left = self._nodes[1:][joined[:-1]]
-        for nodes, shift, sign in ((right, 0, 1), (right, 1, -1), (left, -1, 1), (left, 0, -1)):
-            rows = _forces(sign * half[nodes], variation.m)
+        # Of a node's two fluxes, one on either side: in its own row they cancel but at an end.
+        for sides, shift, sign in self._into:
+            nodes = np.nonzero(sides)[0]
+            rows = _forces((sign * sides)[nodes, None, None] * np.eye(3), variation.m)
             variation.directors(nodes, crossed[nodes], rows, shift)
 
 
@@ -145,28 +146,42 @@ class EndMoment:
     """A moment m(t) on the end of a rod that is free to turn: M(L) = +m, M(0) = -m (derivations.md, section 2).
 
     ``parts(t)`` (3,) in the lab, or along e1, e2, e3 where ``body``. The moment at the end node gives the flux beside
-    it Q = e3 x M and P = M1 O1 + M2 O2, and the spin of the node m.e3 and its source.
+    it Q = e3 x M and P = M1 O1 + M2 O2, and the node the torque m.e3 and its source. Rods that are ``torque_free`` have
+    Q/|d| where Eq. 44 has Q/ds, and no source at an end, so that the rod gets the moment m and no other.
     """
 
-    def __init__(self, mesh: Mesh, node: int, finish: bool, parts: Callable[[float], np.ndarray], body: bool) -> None:
+    def __init__(
+        self,
+        mesh: Mesh,
+        node: int,
+        finish: bool,
+        parts: Callable[[float], np.ndarray],
+        body: bool,
+        torque_free: bool = False,
+    ) -> None:
         self.node, self.parts, self.body = np.array([node]), parts, body
         self.sign = 1.0 if finish else -1.0
         self.inner = -1 if finish else 1  # where the node beside it is
         self.half = node - 1 if finish else node
-        self.ds, self.volume = float(mesh.ds[self.half]), float(mesh.volume[node])
+        self.ds = float(mesh.ds[self.half])
+        self.torque_free, self.volume = torque_free, 0.0 if torque_free else float(mesh.volume[node])
 
-    def _moment(self, shape: Geometry, time: float) -> np.ndarray:
+    def moment(self, shape: Geometry, time: float) -> np.ndarray:
         """M at the node (3,), in the lab."""
         parts = self.parts(time)
         given = vector(shape, self.node, parts[None])[0] if self.body else parts
         return self.sign * given
 
+    def _distance(self, shape: Geometry) -> float:
+        """What Q is divided by."""
+        return float(shape.length[self.half]) if self.torque_free else self.ds
+
     def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
-        """The flux (sign Q - P d/2)/ds between the node and its neighbour, and the torque on the node."""
+        """The flux sign Q/ds - P d/(2 ds) between the node and its neighbour, and the torque on the node."""
         i = int(self.node[0])
-        moment, gap = self._moment(shape, time), shape.gap[self.half]
-        q, p = np.cross(shape.e3[i], moment), moment @ np.cross(shape.e3[i], shape.d2[i])
-        flux = (self.sign * q - 0.5 * p * gap) / self.ds
+        moment, gap = self.moment(shape, time), shape.gap[self.half]
+        q, p = cross(shape.e3[i], moment), moment @ cross(shape.e3[i], shape.d2[i])
+        flux = self.sign * q / self._distance(shape) - 0.5 * p * gap / self.ds
         force[i, :3] -= self.sign * flux
         force[i + self.inner, :3] += self.sign * flux
         if force.shape[1] == 4:
@@ -176,38 +191,38 @@ class EndMoment:
             force[i, 3] += self.sign * along + self.volume * source
 
     def add_stiffness(self, time: float, variation: Variation) -> None:
-        """Of the flux (sign e3 x M - P d/2)/ds and of the torque, through de3, dr'', the gap, and dM where it turns."""
+        """Of the flux and of the torque, through de3, dr'', the gap, and dM where it turns with the rod."""
         shape, i, m = variation.shape, int(self.node[0]), variation.m
-        moment, gap, e3, d2 = self._moment(shape, time), shape.gap[self.half], shape.e3[i], shape.d2[i]
-        # One matrix (4, 3) on each of de3, dr'', dM: three rows of the flux, one of the node's torque.
-        p = moment @ np.cross(e3, d2)
-        on_e3, on_d2, on_m = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((4, 3))
-        on_e3[:3] = (-self.sign * cross_matrix(moment) - 0.5 * np.outer(gap, np.cross(d2, moment))) / self.ds
-        on_d2[:3] = -0.5 * np.outer(gap, np.cross(moment, e3)) / self.ds
-        on_m[:3] = (self.sign * cross_matrix(e3) - 0.5 * np.outer(gap, np.cross(e3, d2))) / self.ds
+        moment, gap, e3, d2 = self.moment(shape, time), shape.gap[self.half], shape.e3[i], shape.d2[i]
+        q, p, lever = self.sign / self._distance(shape), moment @ cross(e3, d2), 0.5 * gap / self.ds
+        # One matrix (4, 3) on each of de3, dr'', dd, dM: three rows of the flux, one of the node's torque.
+        on_e3, on_d2, on_gap, on_m = np.zeros((4, 4, 3))
+        on_e3[:3] = -q * cross_matrix(moment) - np.outer(lever, cross(d2, moment))
+        on_d2[:3] = -np.outer(lever, cross(moment, e3))
+        on_gap[:3] = -0.5 * p / self.ds * np.eye(3)
+        if self.torque_free:
+            on_gap[:3] -= q * np.outer(cross(e3, moment), gap) / shape.length[self.half] ** 2
+        on_m[:3] = q * cross_matrix(e3) - np.outer(lever, cross(e3, d2))
         along, bent = moment @ e3, e3 @ d2
         on_e3[3] = self.sign * moment + self.volume * (moment * bent + along * d2)
         on_d2[3] = self.volume * (along * e3 - moment)
         on_m[3] = self.sign * e3 + self.volume * (bent * e3 - d2)
-        here, beside = np.array([-self.sign] * 3 + [1.0])[:m, None], np.array([self.sign] * 3 + [0.0])[:m, None]
-        for factor, shift in ((here, 0), (beside, self.inner)):
-            variation.tangent(self.node, (factor * on_e3[:m])[None], shift)
-            variation.curvature(self.node, (factor * on_d2[:m])[None], shift)
-            if self.body:
-                parts = self.sign * self.parts(time)
-                variation.directors(self.node, parts[None], (factor * on_m[:m])[None], shift)
-            stretch = (factor * np.vstack([-0.5 * p / self.ds * np.eye(3), np.zeros(3)])[:m])[None]
-            right, left = np.array([self.half + 1]), np.array([self.half])
-            row = i + shift
-            variation.position(right, stretch, row - self.half - 1)
-            variation.position(left, -stretch, row - self.half)
+        # Into the row of the node, and into that of the node beside it, which feels the opposite force and no torque.
+        node, shift = self.node.repeat(2), np.array([0, self.inner])
+        side = self.sign * np.array([[-1.0], [1.0]]) * np.ones(4)
+        side[:, 3] = 1.0, 0.0
+        side = side[:, :m, None]
+        variation.tangent(node, side * on_e3[:m], shift)
+        variation.curvature(node, side * on_d2[:m], shift)
+        if self.body:
+            variation.directors(node, (self.sign * self.parts(time))[None].repeat(2, axis=0), side * on_m[:m], shift)
+        for end, factor in ((self.half + 1, 1.0), (self.half, -1.0)):
+            variation.position(np.array([end, end]), factor * side * on_gap[:m], i + shift - end)
 
 
 def vector(shape: Geometry, nodes: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """p1 e1 + p2 e2 + p3 e3 (k, 3) at nodes (k,), from parts (k, 3)."""
-    return (
-        parts[:, :1] * shape.e1[nodes] + parts[:, 1:2] * shape.e2[nodes] + parts[:, 2:] * shape.e3[nodes]
-    )
+    return parts[:, :1] * shape.e1[nodes] + parts[:, 1:2] * shape.e2[nodes] + parts[:, 2:] * shape.e3[nodes]
 
 
 def cross_matrix(v: np.ndarray) -> np.ndarray:

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from . import checkpoint
-from .errors import Interrupted, RunFailed
+from .errors import Interrupted, RunFailed, Stopped
 from .expectations import Check, check
 from .observe import Observers, Summary
 from .progress import Progress, Signals
@@ -148,21 +149,31 @@ class Loop:
         self._progress = Progress(simulation.time, self.case.time.end, self._log, self._show)
         for due in dues:
             if due.time > simulation.time + slack:
-                simulation.advance(due.time, self._after_step)
+                try:
+                    simulation.advance(due.time, self._after_step)
+                except Stopped as stopped:
+                    if self._frame is None or simulation.time > self._frame.time:
+                        self._output(simulation.frame())
+                    return "stopped", str(stopped)
             frame = simulation.frame(self._fields(due))
             if due.fields and frame.grid and self._recorder is not None:
                 self._recorder.append_fields(frame.time, frame.grid)
             if due.output:
-                self._frame = frame
-                values = self._seen.take(frame)
-                if self._recorder is not None:
-                    self._recorder.append(frame, values)
+                self._output(frame)
                 reason = self._rules.check(frame.time)
                 if reason:
                     return "stopped", reason
         return "finished", ""
 
+    def _output(self, frame: Frame) -> None:
+        self._frame = frame
+        values = self._seen.take(frame)
+        if self._recorder is not None:
+            self._recorder.append(frame, values)
+
     def _after_step(self) -> None:
+        while self.simulation.notices:
+            self._log(f"warning: {self.simulation.notices.pop(0)}")
         if self._signals.caught:
             raise Interrupted
         now = clock.monotonic()
@@ -224,7 +235,8 @@ class Loop:
     def _guarded(self, work: Callable[[], tuple[str, str]]) -> Result:
         """Do the work, and leave the files as they should be however it ends."""
         try:
-            with self._signals:
+            # Small dense solves on all cores of a busy machine are some forty times slower than on one.
+            with self._signals, threadpool_limits(limits=self.case.compute.threads, user_api="blas"):
                 try:
                     status, reason = work()
                 except Interrupted:

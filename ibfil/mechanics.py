@@ -10,10 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
-from . import banded, elasticity, frame
+from . import banded, elasticity
 from .elasticity import Moment
 from .fluid import Held
-from .geometry import Geometry, measure, tangents
+from .geometry import Geometry, measure, moved, tangents
 from .rods import Mesh
 from .variation import Variation
 
@@ -21,8 +21,13 @@ from .variation import Variation
 class Law(Protocol):
     """A constitutive law of all n nodes: strains in, moments out, with their derivatives.
 
-    The caller puts zeros into what is returned at ends that carry no moment.
+    The caller puts zeros into what is returned at ends that carry no moment. ``beside`` (n, 2) are dM3/dO3 at a half
+    node by the twist of the half nodes before and after it, or None where M3 is a matter of its own half node.
     """
+
+    @property
+    def beside(self) -> np.ndarray | None:
+        """Constant in time, zero where there is no such half node."""
 
     def bending(self, bend: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
         """M1, M2 (n, 2) and dM_a/dO_b (n, 2, 2) of the curvatures (n, 2)."""
@@ -80,9 +85,9 @@ class Mechanics:
         self.mesh, self.law, self.stretching, self.length = mesh, law, stretching, length
         self.ends, self.loads, self.unknowns = ends, loads, unknowns
         self._free = np.nonzero(free)[0]
-        self.profile = banded.profile(mesh)
+        self.profile = banded.profile(mesh, 1 if law.beside is None else 2)
         self._matrix_shape = (len(free), unknowns, (2 * self.profile.width + 1) * unknowns)
-        self._lengths = (0,) * unknowns, (0,) * (unknowns * mesh.w1.shape[1])
+        self._stencils = elasticity.stencils(mesh)
         self._zero = np.zeros(len(free))
 
     def start(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
@@ -98,19 +103,15 @@ class Mechanics:
 
     def move(self, start: Geometry, y: np.ndarray) -> Geometry:
         """The configuration displaced by y (n, m) from ``start``, e1 carried along and turned."""
-        r = start.r + y[:, :3]
-        e3 = tangents(self.mesh, r)
-        e1, least = frame.carry(start.e1, start.e3, e3, y[:, 3] if self.unknowns == 4 else self._zero)
+        shape, least, where = moved(self.mesh, start, y)
         if not least > 0.02:
-            raise TangentReversed(int(np.argmin(np.sum(start.e3 * e3, axis=1))))
-        return measure(self.mesh, r, e1)
+            raise TangentReversed(where)
+        return shape
 
     def moment(self, shape: Geometry, time: float) -> Moment:
         """The law's moments, zero at free ends."""
         bend, bend_slope = self.law.bending(shape.bend, time)
-        if self._free.size:
-            bend[self._free] = 0.0
-            bend_slope[self._free] = 0.0
+        elasticity.release(self._free, bend, bend_slope)
         if self.unknowns == 3:
             return Moment(bend, bend_slope, self._zero, self._zero)
         return Moment(bend, bend_slope, *self.law.twisting(shape.twist, time))
@@ -118,25 +119,45 @@ class Mechanics:
     def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Moment]:
         """Eq. 44 and the loads on each node, (n, m), and the moments they come from."""
         moment = self.moment(shape, time)
-        force = np.zeros((len(shape.r), self.unknowns))
-        elasticity.nodal_force(self.mesh, shape, moment, self.stretching, force)
+        force = self.elastic(shape, moment, self.stretching)
         for load in self.loads:
             load.add_force(shape, time, force)
         return force, moment
 
-    def stiffness(
-        self, shape: Geometry, start: Geometry, moment: Moment, time: float, clip: bool
-    ) -> np.ndarray:
+    def elastic(self, shape: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:
+        """Eq. 44 (n, m) for given moments and axial stiffness (n,)."""
+        force = np.zeros((len(shape.table), self.unknowns))
+        elasticity.nodal_force(self.mesh, shape, moment, stretching, force)
+        return force
+
+    def _levers(self, shape: Geometry) -> np.ndarray:
+        """The forces (n, 2, m) that a unit M3 at each half node gives the nodes before and after it.
+
+        The force is linear in M3 and M3 reaches the two nodes beside it, so every other half node is tried at once.
+        """
+        n = len(shape.r)
+        none = Moment(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n))
+        out = np.zeros((n, 2, self.unknowns))
+        for first in (0, 1):
+            unit = np.where((np.arange(n) % 2 == first) & self.mesh.joined, 1.0, 0.0)
+            force = self.elastic(shape, none._replace(twist=unit), self._zero)
+            half = np.nonzero(unit)[0]
+            out[half] = np.stack([force[half], force[half + 1]], axis=1)
+        return out
+
+    def stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, clip: bool) -> np.ndarray:
         """The exact Jacobian of ``forces`` with respect to the displacements from ``start``, by bands."""
         matrix = np.zeros(self._matrix_shape)
-        elasticity.stiffness(
-            self.mesh, shape, moment, self.stretching, start.e3, clip, *self._lengths, matrix
-        )
-        if self.loads:
-            variation = Variation(self.mesh, shape, start, matrix)
-            for load in self.loads:
-                load.add_stiffness(time, variation)
+        elasticity.stiffness(self.mesh, self._stencils, shape, start, moment, self.stretching, clip, matrix)
+        self._add_stiffness(Variation(self.mesh, shape, start, matrix), time)
         return matrix
+
+    def _add_stiffness(self, variation: Variation, time: float) -> None:
+        """What the kernels leave out: the part of M3 that comes from half nodes beside, and the loads."""
+        if self.law.beside is not None:
+            variation.beside(self._levers(variation.shape), self.law.beside)
+        for load in self.loads:
+            load.add_stiffness(time, variation)
 
     def held(self, before: float, after: float) -> Held:
         """The prescribed displacements between two times."""

@@ -16,6 +16,7 @@ from numba import njit
 from scipy.fft import irfftn
 
 from .grid import Grid
+from .vectors import NOT_NEGATIVE
 
 _COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -39,7 +40,7 @@ def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarr
 
 
 def octant(response: np.ndarray, points: int) -> np.ndarray:
-    """The octant of G that every pair can be mirrored into, with a rim of points - 1 cells, as (x, y, z and component)."""
+    """The octant of G that every pair can be mirrored into, with a rim of points - 1 cells: (x, y, z and part)."""
     rim = points - 1
     axes = [np.arange(-rim, n // 2 + rim + 1) % n for n in response.shape[1:]]
     cut = response[:, axes[0][:, None, None], axes[1][None, :, None], axes[2][None, None, :]]
@@ -47,33 +48,50 @@ def octant(response: np.ndarray, points: int) -> np.ndarray:
     return table.reshape(*table.shape[:2], -1)
 
 
-@njit(cache=True)
-def _correlate(wp, wq, mirrored, out):
-    """c[m] for one axis, m = -(P-1) .. P-1 from index 0; reversed where the pair is mirrored."""
-    p = wp.shape[0]
-    out[:] = 0.0
-    for i in range(p):
-        for j in range(p):
-            m = j - i if mirrored else i - j
-            out[m + p - 1] += wp[i] * wq[j]
-
-
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _sum(table, x, y, z, c, acc, sums):
-    """sums[component] = sum_m c_x c_y c_z G(corner + m); ``acc`` is room for the sums over the first two axes."""
-    terms = c.shape[1]
-    length, first = 6 * terms, 6 * z
-    acc[:] = 0.0
+def _pair(table, cells, base, weights, a, b, c, acc, sums):
+    """M_ab into ``sums`` (6,): xx, yy, zz, xy, xz, yz; ``c`` (3, 2 P - 1), ``acc`` (6 (2 P - 1),) are room to work in.
+
+    Arrays are indexed in full in every loop: a view of one costs more here than the arithmetic.
+    """
+    p = weights.shape[2]
+    terms = 2 * p - 1
+    length = 6 * terms
+    corner = (0, 0, 0)
+    sign = (1.0, 1.0, 1.0)
+    for axis in range(3):
+        n = cells[axis]
+        d = (base[a, axis] - base[b, axis]) % n
+        mirrored = d > n // 2
+        for m in range(terms):
+            c[axis, m] = 0.0
+        for i in range(p):
+            for j in range(p):
+                m = j - i if mirrored else i - j
+                c[axis, m + p - 1] += weights[a, axis, i] * weights[b, axis, j]
+        at, s = (n - d, -1.0) if mirrored else (d, 1.0)
+        at &= NOT_NEGATIVE
+        if axis == 0:
+            corner, sign = (at, 0, 0), (s, 1.0, 1.0)
+        elif axis == 1:
+            corner, sign = (corner[0], at, 0), (sign[0], s, 1.0)
+        else:
+            corner, sign = (corner[0], corner[1], 6 * at), (sign[0], sign[1], s)
+    for k in range(length):
+        acc[k] = 0.0
     for i in range(terms):
         for j in range(terms):
             w = c[0, i] * c[1, j]
-            line = table[x + i, y + j]
             for k in range(length):
-                acc[k] += w * line[first + k]
-    sums[:] = 0.0
+                acc[k] += w * table[corner[0] + i, corner[1] + j, corner[2] + k]
+    for x in range(6):
+        sums[x] = 0.0
     for k in range(terms):
-        for a in range(6):
-            sums[a] += c[2, k] * acc[6 * k + a]
+        for x in range(6):
+            sums[x] += c[2, k] * acc[6 * k + x]
+    sums[3] *= sign[0] * sign[1]
+    sums[4] *= sign[0] * sign[2]
+    sums[5] *= sign[1] * sign[2]
 
 
 @njit(cache=True)
@@ -82,55 +100,36 @@ def pairs(table, cells, base, weights, slip, rows, columns):
 
     ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils, ``table`` the octant.
     """
-    p = weights.shape[2]
-    c, acc, sums, corner = np.empty((3, 2 * p - 1)), np.empty(6 * (2 * p - 1)), np.empty(6), np.empty(3, np.int64)
-    sign = np.empty(3)
+    terms = 2 * weights.shape[2] - 1
+    c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((rows.size, 3, columns.size, 3))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            for axis in range(3):
-                n = cells[axis]
-                d = (base[a, axis] - base[b, axis]) % n
-                mirrored = d > n // 2
-                _correlate(weights[a, axis], weights[b, axis], mirrored, c[axis])
-                corner[axis] = n - d if mirrored else d
-                sign[axis] = -1.0 if mirrored else 1.0
-            _sum(table, corner[0], corner[1], corner[2], c, acc, sums)
-            m = out[i, :, j, :]
-            m[0, 0], m[1, 1], m[2, 2] = sums[0], sums[1], sums[2]
-            m[0, 1] = m[1, 0] = sign[0] * sign[1] * sums[3]
-            m[0, 2] = m[2, 0] = sign[0] * sign[2] * sums[4]
-            m[1, 2] = m[2, 1] = sign[1] * sign[2] * sums[5]
-            if a == b:
-                for axis in range(3):
-                    m[axis, axis] += slip[a]
+            _pair(table, cells, base, weights, a, b, c, acc, sums)
+            for x in range(3):
+                out[i, x, j, x] = sums[x] + (slip[a] if a == b else 0.0)
+            out[i, 0, j, 1] = out[i, 1, j, 0] = sums[3]
+            out[i, 0, j, 2] = out[i, 2, j, 0] = sums[4]
+            out[i, 1, j, 2] = out[i, 2, j, 1] = sums[5]
     return out
 
 
 @njit(cache=True)
 def mobility(table, cells, base, weights, slip):
     """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
-    n, p = weights.shape[0], weights.shape[2]
-    c, acc, sums, corner = np.empty((3, 2 * p - 1)), np.empty(6 * (2 * p - 1)), np.empty(6), np.empty(3, np.int64)
-    sign = np.empty(3)
+    n = weights.shape[0]
+    terms = 2 * weights.shape[2] - 1
+    c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((n, 3, n, 3))
     for a in range(n):
         for b in range(a, n):
-            for axis in range(3):
-                cell = cells[axis]
-                d = (base[a, axis] - base[b, axis]) % cell
-                mirrored = d > cell // 2
-                _correlate(weights[a, axis], weights[b, axis], mirrored, c[axis])
-                corner[axis] = cell - d if mirrored else d
-                sign[axis] = -1.0 if mirrored else 1.0
-            _sum(table, corner[0], corner[1], corner[2], c, acc, sums)
-            xy, xz, yz = sign[0] * sign[1] * sums[3], sign[0] * sign[2] * sums[4], sign[1] * sign[2] * sums[5]
+            _pair(table, cells, base, weights, a, b, c, acc, sums)
             for x in range(3):
                 out[a, x, b, x] = out[b, x, a, x] = sums[x]
-            out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = xy
-            out[a, 0, b, 2] = out[b, 0, a, 2] = out[a, 2, b, 0] = out[b, 2, a, 0] = xz
-            out[a, 1, b, 2] = out[b, 1, a, 2] = out[a, 2, b, 1] = out[b, 2, a, 1] = yz
+            out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = sums[3]
+            out[a, 0, b, 2] = out[b, 0, a, 2] = out[a, 2, b, 0] = out[b, 2, a, 0] = sums[4]
+            out[a, 1, b, 2] = out[b, 1, a, 2] = out[a, 2, b, 1] = out[b, 2, a, 1] = sums[5]
         for x in range(3):
             out[a, x, a, x] += slip[a]
     return out

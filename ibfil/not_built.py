@@ -53,37 +53,14 @@ NOT_BUILT: list[Row] = [
         "the shape of another run",
         "the other kinds",
     ),
-    Row(_filaments("copies", lambda f: f.copies is not None), "copies of a filament", "one table a filament"),
-    Row(_filaments("law.kind", lambda f: f.law.kind != "linear"), "a nonlinear moment law", '"linear"'),
-    Row(_scene("contact", lambda c: c.contact is not None), "the search for contact", "no such table"),
-    Row(_scene("thermal", lambda c: c.thermal is not None), "thermal noise", "no such table"),
+    Row(_fluid("model", lambda f: f.model == "navier-stokes"), "the Navier-Stokes fluid", '"rft" or "stokes"'),
     Row(
-        _fluid("model", lambda f: f.model == "navier-stokes"), "the Navier-Stokes fluid", '"rft" or "stokes"'
-    ),
-    Row(
-        _fluid("drag", lambda f: f.model == "rft" and hasattr(f.drag, "matched")),
-        "drag matched to the grid",
-        '"paper", "slender" or {perp, par}',
-    ),
-    Row(_grid("thickness", lambda f: f.thickness is not None), "cells chosen by thickness", "cells"),
-    Row(
-        _grid("method", lambda f: f.method in ("pruned", "averaged", "krylov")),
+        _grid("method", lambda f: f.method == "averaged"),
         "this method",
-        '"auto", "fft" or "table"',
+        '"auto", "fft", "pruned", "table" or "krylov"',
     ),
     Row(_grid("precision", lambda f: f.precision != "double"), "single precision", '"double"'),
     Row(_grid("rotation", lambda f: f.rotation != "local"), "torque coupling to the grid", '"local"'),
-    Row(_scene("time.tolerance", lambda c: c.time.tolerance is not None), "adaptive steps", "step"),
-    Row(
-        _scene("output.probes", lambda c: c.fluid.model != "rft" and bool(c.output.probes)),
-        "probes of the fluid's velocity",
-        "no such key",
-    ),
-    Row(
-        _scene("output.fields", lambda c: c.fluid.model != "rft" and set(c.output.fields) != {"velocity"}),
-        "fields other than velocity",
-        '["velocity"]',
-    ),
 ]
 
 

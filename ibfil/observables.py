@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from .fits import trapezoid_weights
 from .frames import FilamentFrame, Frame
 from .observe import Kind, Unfit, Value
-from .place import Place, control_lengths
+from .place import Place
 from .shapes import node_arclength
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class OfFilament(Kind):
         super().__init__(case, observe)
         self.length = case.filaments[self.filament].length
         self.s = node_arclength(case.filaments[self.filament])
-        self.share = control_lengths(self.s) / self.length  # (N,) of each node in the filament
+        self.share = trapezoid_weights(self.s) / self.length  # (N,) of each node in the filament
 
     def look(self, frame: Frame) -> FilamentFrame:
         """Return this filament at one output."""
@@ -51,9 +52,7 @@ class AtPlace(OfFilament):
             raise Unfit("at", self.at, POINTS)
         self.space = observe.space
         mean_only = self.mean_only or self.vector
-        if isinstance(self.at, tuple) and self.space not in (
-            ("mean",) if mean_only else ("mean", "max", "min")
-        ):
+        if isinstance(self.at, tuple) and self.space not in (("mean",) if mean_only else ("mean", "max", "min")):
             words = '"mean"' if mean_only else '"mean", "max" or "min"'
             more = "" if self.mean_only or not self.vector else '; "max" and "min" with `along`'
             raise Unfit("space", self.space, f"{words} where `at` is a window{more}")
@@ -189,9 +188,7 @@ class Stretch(AtPlace, kind="stretch"):
         values = (lengths / self.ds - 1.0)[self.chosen]
         if self.space == "max":
             return float(values.max())
-        return float(
-            values.min() if self.space == "min" else np.average(values, weights=self.ds[self.chosen])
-        )
+        return float(values.min() if self.space == "min" else np.average(values, weights=self.ds[self.chosen]))
 
 
 class EndToEnd(OfFilament, kind="end_to_end"):

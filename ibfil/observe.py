@@ -186,9 +186,7 @@ class Kind:
         self.over, self._how = observe.over, observe.summary
         along = observe.along or self.along
         self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
-        details = [
-            f"{key} = {_shown(getattr(observe, key))}" for key in ("at", "along", "space") if key in given
-        ]
+        details = [f"{key} = {_shown(getattr(observe, key))}" for key in ("at", "along", "space") if key in given]
         self.description = ", ".join([f"{self.description} of {observe.filament}", *details])
 
     def sample(self, frame: Frame) -> Value:

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .fits import trapezoid_weights
 from .rods import weights
 
 At = str | float | tuple[float, float]
-
-
-def control_lengths(s: np.ndarray) -> np.ndarray:
-    """Length (N,) that belongs to each node: half of each neighbouring segment."""
-    half = 0.5 * np.diff(s)
-    return np.append(half, 0.0) + np.append(0.0, half)
 
 
 def point_weights(s: np.ndarray, at: float) -> np.ndarray:
@@ -36,13 +31,13 @@ class Place:
 
     def __init__(self, s: np.ndarray, at: At) -> None:
         if at == "centroid":
-            self._rows = control_lengths(s)[None] / (s[-1] - s[0])
+            self._rows = trapezoid_weights(s)[None] / (s[-1] - s[0])
             self._share = np.ones(1)
         elif isinstance(at, tuple):
             inside = s[(s > at[0] + 1e-9 * s[-1]) & (s < at[1] - 1e-9 * s[-1])]
             points = np.array([at[0], *inside, at[1]])
             self._rows = np.array([point_weights(s, x) for x in points])
-            self._share = control_lengths(points) / (at[1] - at[0])
+            self._share = trapezoid_weights(points) / (at[1] - at[0])
         else:
             named = {"start": s[0], "middle": 0.5 * s[-1], "finish": s[-1]}
             self._rows = point_weights(s, float(named[at] if isinstance(at, str) else at))[None]

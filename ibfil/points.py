@@ -62,9 +62,7 @@ def _read_csv(path: Path) -> np.ndarray:
         try:
             rows.append([float(cell) for cell in cells])
         except ValueError:
-            raise ValueError(
-                f"line {number} is not numbers divided by commas: {line.strip()[:60]!r}"
-            ) from None
+            raise ValueError(f"line {number} is not numbers divided by commas: {line.strip()[:60]!r}") from None
         if len(rows[-1]) != len(rows[0]):
             raise ValueError(f"line {number} has {len(cells)} columns where the first row has {len(rows[0])}")
     return np.array(rows, float).reshape(len(rows), len(rows[0]) if rows else 0)

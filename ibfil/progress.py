@@ -71,4 +71,5 @@ class Signals:
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
-            signal.signal(number, handler)
+            if handler is not None:  # as of one that was not set from Python
+                signal.signal(number, handler)

@@ -100,6 +100,8 @@ class RunFile:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        # Looked at first: a writer that ends after this has said in the file how.
+        self._was_written = journal.is_being_written(journal_path(self.path))
         self._file = _open(self.path)
         try:
             _check_format(self._file, self.path)
@@ -195,13 +197,13 @@ class RunFile:
 
     @property
     def status(self) -> str:
-        """How the run is: one word.
+        """How the run was when the file was opened: one word.
 
         running | finished | stopped (by a stop rule) | failed | interrupted (Ctrl-C) | cut (killed)
         """
         status = self._attribute("status")
-        if status == "running" and not journal.is_being_written(journal_path(self.path)):
-            return "cut"
+        if status == "running" and not self._was_written:
+            return "running" if journal.is_being_written(journal_path(self.path)) else "cut"
         return status
 
     @property
@@ -264,9 +266,7 @@ class RunFile:
         stop = self._rows if stop is None else min(stop, self._rows)
         for low in range(start, stop, _BLOCK):
             block = slice(low, min(low + _BLOCK, stop))
-            filaments = {
-                n: {k: c[block] for k, c in columns.items()} for n, columns in self.filaments.items()
-            }
+            filaments = {n: {k: c[block] for k, c in columns.items()} for n, columns in self.filaments.items()}
             diagnostics = {name: column[block] for name, column in self.diagnostics.items()}
             for i, time in enumerate(self.time[block]):
                 yield Frame(

@@ -54,8 +54,11 @@ _DIAGNOSTICS = {
     "stretch_max": ("1", "largest stretch of a segment, length over rest length minus 1"),
     "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
     "power": ("force length/time", "power of the nodal forces on the fluid, sum of F.u"),
-    "spacing_max_error": ("1", "largest deviation of a segment from its rest length, relative"),
+    "contacts": ("1", "pairs of segments in contact"),
+    "first_contact": ("time", "time of the first contact that was warned of; NaN before"),
     "newton_iterations": ("1", "Newton iterations of the last step"),
+    "steps_shortened": ("1", "steps so far that had to be tried again with a shorter one"),
+    "probe_velocity": ("length/time", "velocity at output.probes"),
 }
 _FIELDS = {
     "velocity": ("length/time", "velocity of the fluid"),
@@ -133,9 +136,7 @@ class Recorder:
         return self
 
     @classmethod
-    def resume(
-        cls, path: Path, case: Case, outputs: int, fields: int, grid: GridPlace | None = None
-    ) -> Recorder:
+    def resume(cls, path: Path, case: Case, outputs: int, fields: int, grid: GridPlace | None = None) -> Recorder:
         """Go on with a run file, cut back to so many ``outputs`` and ``fields``. Raises as `create`."""
         with _writing(path), _owned(path):
             file = JournaledFile(path, journal_path(path))
@@ -302,9 +303,7 @@ def _writing(path: Path, file: JournaledFile | None = None) -> Iterator[None]:
         cause = (file and file.error) or error
         if not isinstance(cause, OSError):
             raise
-        advice = (
-            "write elsewhere with -o" if file is None else "free some space; what was written before is whole"
-        )
+        advice = "write elsewhere with -o" if file is None else "free some space; what was written before is whole"
         raise RunFailed(f"{path} cannot be written ({cause.strerror or cause})", advice=advice) from error
 
 
@@ -349,12 +348,17 @@ def _meaning(name: str, observables: Mapping[str, Meaning]) -> Meaning:
     return Meaning(*_FILAMENT[last])
 
 
-def _about(case: Case, method: str, wisdom: str) -> dict[str, Any]:
-    """Return the attributes of a run that begins."""
-    versions = {"ibfil": __version__, "python": platform.python_version()}
+def versions() -> dict[str, str]:
+    """Versions of ibfil, Python and the libraries that results depend on."""
+    found = {"ibfil": __version__, "python": platform.python_version()}
     for library in _LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            versions[library] = metadata.version(library)
+            found[library] = metadata.version(library)
+    return found
+
+
+def _about(case: Case, method: str, wisdom: str) -> dict[str, Any]:
+    """Return the attributes of a run that begins."""
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -362,7 +366,7 @@ def _about(case: Case, method: str, wisdom: str) -> dict[str, Any]:
         "case": case.text,
         "created": _now(),
         "finished": "",
-        "versions": json.dumps(versions),
+        "versions": json.dumps(versions()),
         "method": method,
         "wisdom": wisdom,
         "status": "running",

@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import costs
 from .case import idle_keys
+from .case_schema import Matched
 from .groups import groups, warnings
 from .simulation import Simulation
 
 if TYPE_CHECKING:
     from .case import Case
-
-# Seconds, one thread of a machine of 2025: what the counts below are multiplied with for the estimate.
-_NODE, _PAIR, _FLOP, _CELL = 2.0e-6, 0.8e-6, 1.0e-10, 1.4e-8
-_ITERATIONS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}
+    from .case_schema import Contact, Thermal
 
 
 def report(case: Case) -> str:
@@ -50,9 +49,15 @@ def modelled(case: Case) -> list[str]:
             if end.follower is not None:
                 terms.append(f"follower force at {side}")
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
+    if case.contact is not None:
+        out.append(_contact(case.contact))
     fluid = case.fluid
     if fluid.model == "rft":
         out.append("resistive-force drag on each node; no flow between nodes")
+        if isinstance(fluid.drag, Matched):
+            out.append(f"its coefficients those of a straight rod of length {fluid.drag.matched:g} in the case's grid")
+        if case.thermal is not None:
+            out.append(_thermal(case.thermal))
         return out
     out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
     if fluid.slip:
@@ -60,6 +65,22 @@ def modelled(case: Case) -> list[str]:
     if any(f.twisting is not None for f in case.filaments.values()):
         out.append("spin against the rod's own drag (rotation = local)")
     return out
+
+
+def _contact(contact: Contact) -> str:
+    where = "the sum of radii" if contact.distance is None else f"{contact.distance:g}"
+    acts = {
+        "stop": "the first ends the run",
+        "warn": "the first is told",
+        "repel": f"repulsion of {contact.strength:g} at that distance, none at twice that",
+    }
+    return f"contact of axes nearer than {where}, looked for each step: {acts[contact.action]}"
+
+
+def _thermal(thermal: Thermal) -> str:
+    kinds = "forces and twist moments" if thermal.twist else "forces"
+    where = "" if thermal.directions == "xyz" else " in the plane z = const"
+    return f"thermal {kinds}{where}, kT = {thermal.energy:g}, seed {thermal.seed}"
 
 
 def absent(case: Case) -> list[str]:
@@ -77,6 +98,8 @@ def absent(case: Case) -> list[str]:
         out.append("contact: filaments may pass through each other")
     if case.thermal is None:
         out.append("thermal noise")
+    elif not case.thermal.twist and any(f.twisting is not None for f in case.filaments.values()):
+        out.append("thermal twist moments")
     out.append("inertia of the rod and of the fluid; walls; heads; closed rods")
     return out
 
@@ -100,23 +123,15 @@ def memory(simulation: Simulation) -> dict[str, float]:
     cells = simulation.grid.cells
     rim = KERNELS[case.fluid.kernel].points - 1
     out["mobility table"] = 8.0 * 6 * float(np.prod(cells // 2 + 1 + 2 * rim))
-    out["dense matrices"] = 4 * 8.0 * (3 * n) ** 2
-    if simulation.method == "fft" or case.output.grid_every is not None:
+    blocks = [n] if simulation.method != "krylov" else [f.nodes for f in case.filaments.values()]
+    if simulation.method == "krylov":
+        out["preconditioner"] = sum(8.0 * (3 * k) ** 2 for k in blocks) + 2 * out["band matrix"]
+        out["Krylov vectors"] = 60 * 8.0 * 3 * n
+    else:
+        out["dense matrices"] = costs.dense_bytes(n)
+    if simulation.method != "table" or case.output.grid_every is not None:
         out["fields and their transforms"] = 2 * 3 * 8.0 * float(np.prod(cells))
     return out
-
-
-def _seconds_a_step(simulation: Simulation) -> float:
-    """From counts alone, so that the same case always gets the same answer."""
-    case, n = simulation.case, len(simulation.arclength)
-    rounds = _ITERATIONS[case.time.scheme]
-    seconds = rounds * n * _NODE
-    if simulation.grid is None:
-        return seconds
-    seconds += 0.5 * n * n * _PAIR + rounds * 4 * (3.0 * n) ** 3 * _FLOP
-    if simulation.method == "fft":
-        seconds += rounds * 4 * float(np.prod(simulation.grid.cells)) * _CELL
-    return seconds
 
 
 def _disk(simulation: Simulation) -> float:
@@ -134,15 +149,16 @@ def _costs(simulation: Simulation) -> list[str]:
     unknowns = simulation.mechanics.unknowns
     lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
     if simulation.grid is not None:
-        lines.append(
-            f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {simulation.grid.spacing:.4g}"
-        )
+        lines.append(f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {simulation.grid.spacing:.4g}")
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
     lines.append(f"disk at most {_bytes(_disk(simulation))}, fields compressed")
     steps = case.time.end / simulation.step_length
-    seconds = steps * _seconds_a_step(simulation)
+    seconds = steps * simulation.method_seconds[simulation.method]
+    if simulation.grid is not None:
+        others = ", ".join(f"{k} {v:.2g}" for k, v in simulation.method_seconds.items() if np.isfinite(v))
+        lines.append(f"seconds a step, from counts: {others}")
     lines.append(f"about {steps:.0f} steps, {seconds:.2g} s after start-up, from counts (within a factor 3)")
     return lines
 
@@ -150,8 +166,9 @@ def _costs(simulation: Simulation) -> list[str]:
 def _steps(simulation: Simulation) -> list[str]:
     case = simulation.case
     chosen = "automatic" if case.time.step == "auto" else "given"
+    scheme = case.time.scheme if case.thermal is None else "linearised trapezoid (semi-implicit)"
     lines = [
-        f"{case.time.scheme}, order {case.time.order}: dt = {simulation.step_length:.4g} ({chosen})",
+        f"{scheme}, order {case.time.order}: dt = {simulation.step_length:.4g} ({chosen})",
         f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
     ]

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 
 from . import banded
-from .fluid import Answer, Held
+from .fluid import Answer, Held, Memoryless
+from .vectors import at, dot, mix, put
 
 
 class Drag(NamedTuple):
@@ -30,9 +31,8 @@ def resist(drag: Drag, e3, u):
     n, m = u.shape
     out = np.empty((n, m))
     for i in range(n):
-        f = (drag.par[i] - drag.perp[i]) * (u[i, 0] * e3[i, 0] + u[i, 1] * e3[i, 1] + u[i, 2] * e3[i, 2])
-        for c in range(3):
-            out[i, c] = drag.perp[i] * u[i, c] + f * e3[i, c]
+        t, v = at(e3, i, 0), at(u, i, 0)
+        put(out, i, 0, mix(drag.perp[i], v, (drag.par[i] - drag.perp[i]) * dot(v, t), t))
         if m == 4:
             out[i, 3] = drag.spin[i] * u[i, 3]
     return out
@@ -44,32 +44,49 @@ def mobilize(drag: Drag, e3, force):
     n, m = force.shape
     out = np.empty((n, m))
     for i in range(n):
-        along = force[i, 0] * e3[i, 0] + force[i, 1] * e3[i, 1] + force[i, 2] * e3[i, 2]
-        f = (1.0 / drag.par[i] - 1.0 / drag.perp[i]) * along
-        for c in range(3):
-            out[i, c] = force[i, c] / drag.perp[i] + f * e3[i, c]
+        t, f = at(e3, i, 0), at(force, i, 0)
+        put(out, i, 0, mix(1.0 / drag.perp[i], f, (1.0 / drag.par[i] - 1.0 / drag.perp[i]) * dot(f, t), t))
         if m == 4:
             out[i, 3] = force[i, 3] / drag.spin[i]
     return out
 
 
 @njit(cache=True)
-def _less_drag(stiffness, drag, e3, inverse, index):
-    """Turns K into K - Z/tau in place, with unit rows at the held unknowns."""
+def _system(stiffness, drag: Drag, e3, moved, force, inverse):
+    """Turns K into K - Z/tau in place, and returns the right side Z moved/tau - f (n, m)."""
     n, m, width = stiffness.shape
-    w = (width // m - 1) // 2
+    here = (width - m) // 2
+    right = resist(drag, e3, moved)
     for i in range(n):
-        f = (drag.par[i] - drag.perp[i]) * inverse
+        t, along = at(e3, i, 0), (drag.par[i] - drag.perp[i]) * inverse
+        for a in range(m):
+            right[i, a] = inverse * right[i, a] - force[i, a]
         for a in range(3):
             for b in range(3):
-                stiffness[i, a, w * m + b] -= f * e3[i, a] * e3[i, b]
-            stiffness[i, a, w * m + a] -= drag.perp[i] * inverse
+                stiffness[i, a, here + b] -= along * t[a] * t[b]
+            stiffness[i, a, here + a] -= drag.perp[i] * inverse
         if m == 4:
-            stiffness[i, 3, w * m + 3] -= drag.spin[i] * inverse
-    for k in range(index.size):
-        i, a = index[k] // m, index[k] % m
+            stiffness[i, 3, here + 3] -= drag.spin[i] * inverse
+    return right
+
+
+@njit(cache=True)
+def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, profile, unit):
+    """Solves (K - Z/tau) d = Z moved/tau - f with d = value (k,) at the held unknowns (k,).
+
+    Returns d, the force felt Z (moved + d)/tau, the right side, and whether elimination without pivoting went well;
+    ``stiffness`` is used up, ``unit`` a tuple of m entries.
+    """
+    m, width = stiffness.shape[1:]
+    right = _system(stiffness, drag, e3, moved, force, inverse)
+    for k in range(held.size):
+        i, a = held[k] // m, held[k] % m
         stiffness[i, a, :] = 0.0
-        stiffness[i, a, w * m + a] = 1.0
+        stiffness[i, a, (width - m) // 2 + a] = 1.0
+        right[i, a] = value[k]
+    d = right.copy()
+    good = banded.eliminate(stiffness, d, profile.first, profile.last, unit)
+    return d, resist(drag, e3, (moved + d) * inverse), right, good
 
 
 class _Response:
@@ -95,15 +112,18 @@ class _Response:
     ) -> Answer:
         """(K - Z/tau) d = Z/tau (y - target) - Z u0 - f; uses ``stiffness`` up."""
         base = self._velocity_target(target)
-        right = resist(self.drag, self.e3, (y - base) / self.tau) - force
-        nodes = np.unique(held.at // force.shape[1]) if held.at.size else held.at
-        rows = stiffness[nodes]
-        _less_drag(stiffness, self.drag, self.e3, 1.0 / self.tau, held.at)
-        right.ravel()[held.at] = held.value - y.ravel()[held.at]
-        d = banded.solve(stiffness, right, self.profile)
-        felt = resist(self.drag, self.e3, (y + d - base) / self.tau)
+        moved, m, inverse = y - base, force.shape[1], 1.0 / self.tau
+        nodes = np.unique(held.at // m) if held.at.size else held.at
+        rows = stiffness[nodes] if nodes.size else stiffness[:0]
+        value = held.value - y.ravel()[held.at] if nodes.size else held.value
+        d, felt, right, good = _correct(
+            *(stiffness, self.drag, self.e3, moved, force, inverse, held.at, value, self.profile, (0,) * m)
+        )
+        if not good:
+            d = banded.solve_pivoted(stiffness, right)
+            felt = resist(self.drag, self.e3, (moved + d) * inverse)
         if not nodes.size:
-            return Answer(d, felt, np.zeros_like(d))
+            return Answer(d, felt, np.zeros(d.shape))
         rest = felt - force
         rest[nodes] -= _rows_times(rows, nodes, d)
         return Answer(d, felt, _at(held, rest))
@@ -125,7 +145,7 @@ def _rows_times(rows: np.ndarray, nodes: np.ndarray, d: np.ndarray) -> np.ndarra
     return np.stack([row @ padded[i : i + 2 * w + 1].ravel() for row, i in zip(rows, nodes, strict=True)])
 
 
-class ResistiveForce:
+class ResistiveForce(Memoryless):
     """The RFT fluid.
 
     ``drag`` holds the coefficients times the control volumes, ``profile`` where the rods' matrices are not zero;
@@ -138,3 +158,7 @@ class ResistiveForce:
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Response:
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
         return _Response(self.drag, self.profile, e3, None if self.flow is None else self.flow(r, time), tau)
+
+    def velocity_at(self, points: np.ndarray, r: np.ndarray, force: np.ndarray, time: float) -> np.ndarray:
+        """The background velocity (k, 3): in this theory nodes do not move the fluid elsewhere."""
+        return np.zeros_like(points) if self.flow is None else self.flow(points, time)

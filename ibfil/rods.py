@@ -30,12 +30,16 @@ class Mesh(NamedTuple):
 
 
 class Segmented(NamedTuple):
-    """One filament before stacking: arclength of its nodes, derivative order, tangents of clamped ends (or None)."""
+    """One filament before stacking: arclength of its nodes, derivative order, tangents of clamped ends (or None).
+
+    ``ghost``: r'' at clamps by ``ghost_weights``.
+    """
 
     s: np.ndarray
     derivative: int
     start_tangent: np.ndarray | None
     finish_tangent: np.ndarray | None
+    ghost: bool = False
 
 
 def weights(x: np.ndarray, at: float, order: int) -> np.ndarray:
@@ -62,6 +66,15 @@ def clamped_weights(x: np.ndarray) -> tuple[np.ndarray, float]:
     return w[:3] / scale**2, float(w[3] / scale)
 
 
+def ghost_weights(x: np.ndarray) -> tuple[np.ndarray, float]:
+    """Weights of r'' at ``x[0]``, as ``clamped_weights``, by a ghost node: 2 (r2 - r1 - ds T)/ds^2, twice the error.
+
+    But with it and stencils of order 2 the stiffness of a clamped rod is symmetric, which equipartition needs.
+    """
+    ds = x[1] - x[0]
+    return np.array([-2.0, 2.0, 0.0]) / ds**2, -2.0 / float(ds)
+
+
 def _stencils(s: np.ndarray, derivative: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """First node, weights of r' and of r'' for one free filament: 7 points, or 3 (4 for r'' at the ends)."""
     n, p = len(s), (7 if derivative == 6 else 4)
@@ -83,11 +96,11 @@ def _stencils(s: np.ndarray, derivative: int) -> tuple[np.ndarray, np.ndarray, n
     return first, w1, w2
 
 
-def _clamp(s: np.ndarray, end: int, tangent: np.ndarray, mesh: tuple[np.ndarray, ...]) -> None:
+def _clamp(s: np.ndarray, end: int, tangent: np.ndarray, ghost: bool, mesh: tuple[np.ndarray, ...]) -> None:
     """Put the clamp at node ``end`` (0 or -1) into the stencils of one filament."""
     first, w1, w2, c1, c2 = mesh
     order = [0, 1, 2] if end == 0 else [-1, -2, -3]
-    w, slope = clamped_weights(s[order])
+    w, slope = (ghost_weights if ghost else clamped_weights)(s[order])
     nodes = np.arange(len(s))[order]
     w1[end], w2[end] = 0.0, 0.0
     w2[end, nodes - first[end]] = w
@@ -105,7 +118,7 @@ def stack(filaments: Sequence[Segmented]) -> Mesh:
         c1, c2 = np.zeros((n, 3)), np.zeros((n, 3))
         for end, tangent in ((0, f.start_tangent), (-1, f.finish_tangent)):
             if tangent is not None:
-                _clamp(f.s, end, tangent, (first, w1, w2, c1, c2))
+                _clamp(f.s, end, tangent, f.ghost, (first, w1, w2, c1, c2))
         segment = np.diff(f.s)
         volume = 0.5 * (np.append(segment, 0.0) + np.append(0.0, segment))
         pad = ((0, 0), (0, width - w1.shape[1]))

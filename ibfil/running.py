@@ -12,11 +12,12 @@ from .errors import CaseError
 from .loop import Loop, Result
 from .observe import Observable, Observers, observers
 from .record import RunFile, RunFileError, checkpoint_path, journal_path
-from .recorder import refuse_existing
+from .recorder import refuse_existing, versions
 from .stops import StopRules
 
 if TYPE_CHECKING:
     from .case_schema import Case
+    from .laws import MomentLaw
     from .simulation import Simulation
 
     Build = Callable[[Case, str], Simulation]
@@ -31,26 +32,28 @@ def run(
     progress: bool = True,
     log: Callable[[str], object] = print,
     observables: Mapping[str, Observable] | None = None,
+    laws: Mapping[str, MomentLaw] | None = None,
     build: Build | None = None,
 ) -> Result:
     """Run a case (or the case file of that name) and write the run file ``output``; None writes nothing.
 
     With ``resume`` it goes on from the checkpoint of ``output`` if there is one. ``observables`` are further
-    ones, made in Python. ``build`` makes the simulation from the case and FFTW wisdom, by default
-    `Simulation`.
+    ones, made in Python, and ``laws`` constitutive laws by filament (laws.py). ``build`` makes the simulation
+    from the case and FFTW wisdom, by default `Simulation` with these laws.
 
     Raises CaseError (also where ``output`` exists and ``overwrite`` is not set), RunFailed, and Interrupted
     after Ctrl-C or SIGTERM; a second one kills.
     """
     if isinstance(case, str | Path):
         case = read_case(case)
+    build = build or _builder(laws)
     path = None if output is None else Path(output)
     if path is not None and resume and checkpoint_path(path).exists():
         return resume_run(path, case, progress=progress, log=log, observables=observables, build=build)
     seen = observers(case, observables)
     if path is not None:
         refuse_existing(path, overwrite)
-    simulation = _builder(build)(case, "")
+    simulation = build(case, "")
     for line in _banner(simulation):
         log(line)
     return Loop(simulation, seen, log, progress).start(path, overwrite)
@@ -64,15 +67,17 @@ def resume_run(
     progress: bool = True,
     log: Callable[[str], object] = print,
     observables: Mapping[str, Observable] | None = None,
+    laws: Mapping[str, MomentLaw] | None = None,
     build: Build | None = None,
 ) -> Result:
     """Go on with the run in ``path`` from its last checkpoint, bit for bit as if it had never been cut.
 
     The case is the one it began with, or ``case``, or that with ``overrides``: only time.end and output may
     differ. The run file is cut back to the checkpoint; a torn one is put right, and one damaged beyond that
-    is computed anew. Raises as `run`, and RunFileError (a CaseError) where there is nothing to go on from.
+    is computed anew. ``laws`` made in Python have to be given again. Raises as `run`, and RunFileError (a
+    CaseError) where there is nothing to go on from.
     """
-    path = Path(path)
+    path, build = Path(path), build or _builder(laws)
     if journal.is_being_written(journal_path(path)):
         raise RunFileError(f"{path}: is being written by another ibfil that is still running")
     last = _last_checkpoint(path)
@@ -83,24 +88,25 @@ def resume_run(
     try:
         if journal.recover(path, journal_path(path)):
             log(f"{path} was torn when its run was killed; put back to its last whole write")
-        fields_at = _replay(path, last, seen, rules)
+        fields_at, other = _replay(path, last, seen, rules)
     except (RunFileError, OSError, KeyError, ValueError, RuntimeError) as damage:
         log(f"{path} cannot be used ({_why(damage)}); rebuilt by computing it again from t = 0")
-        return run(
-            case, path, overwrite=True, progress=progress, log=log, observables=observables, build=build
-        )
-    simulation = _builder(build)(case, last.wisdom)
+        return run(case, path, overwrite=True, progress=progress, log=log, observables=observables, build=build)
+    simulation = build(case, last.wisdom)
     simulation.restore(dict(last.state))
+    if other:
+        log(f"warning: {other}; the rest may differ in the last digits from a run that was not cut")
     log(f"going on with {path} from t = {last.time:.6g}, after {last.outputs} outputs and {last.steps} steps")
     return Loop(simulation, seen, log, progress, rules).go_on(path, last, fields_at)
 
 
-def _builder(build: Build | None) -> Build:
-    if build is not None:
-        return build
-    from .simulation import Simulation
+def _builder(laws: Mapping[str, MomentLaw] | None) -> Build:
+    def build(case: Case, wisdom: str) -> Simulation:
+        from .simulation import Simulation
 
-    return Simulation
+        return Simulation(case, wisdom, laws or {})
+
+    return build
 
 
 def _banner(simulation: Simulation) -> Iterator[str]:
@@ -142,11 +148,11 @@ def _goes_on(began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
     return case
 
 
-def _replay(path: Path, last: checkpoint.Checkpoint, seen: Observers, rules: StopRules) -> float:
-    """Show the outputs up to the checkpoint to all that looks; the time of the last fields, -1 if none.
+def _replay(path: Path, last: checkpoint.Checkpoint, seen: Observers, rules: StopRules) -> tuple[float, str]:
+    """Show the outputs up to the checkpoint to all that looks.
 
-    Raises RunFileError where the run file has not got them all, and whatever h5py raises where it cannot read
-    them.
+    Gives the time of the last fields, -1 if there are none, and in words which versions have changed. Raises
+    RunFileError where the run file has not got all outputs, and whatever h5py raises where it cannot read them.
     """
     with RunFile(path) as run_file:
         if run_file.created != last.created:
@@ -157,7 +163,10 @@ def _replay(path: Path, last: checkpoint.Checkpoint, seen: Observers, rules: Sto
         for frame in run_file.frames(0, last.outputs):
             seen.take(frame)
             rules.check(frame.time)
-        return -1.0 if grid is None or last.fields == 0 else float(grid.time[last.fields - 1])
+        began, now = run_file.versions, versions()
+        other = [f"{name} is {v}, was {began.get(name, 'none')}" for name, v in now.items() if v != began.get(name)]
+        fields_at = -1.0 if grid is None or last.fields == 0 else float(grid.time[last.fields - 1])
+    return fields_at, ", ".join(other)
 
 
 def _why(damage: Exception) -> str:

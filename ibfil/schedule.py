@@ -52,10 +52,7 @@ def _among(times: np.ndarray, others: np.ndarray, end: float) -> np.ndarray:
     """Which of ``times`` are among the ``others``."""
     if len(others) == 0:
         return np.zeros(len(times), bool)
-    after = (
-        np.clip(np.searchsorted(others, times), 1, len(others) - 1)
-        if len(others) > 1
-        else np.zeros(len(times), int)
-    )
-    nearest = np.minimum(np.abs(others[after] - times), np.abs(others[np.maximum(after - 1, 0)] - times))
+    after = np.clip(np.searchsorted(others, times), 0, len(others) - 1)
+    before = np.maximum(after - 1, 0)
+    nearest = np.minimum(np.abs(others[after] - times), np.abs(others[before] - times))
     return nearest <= SAME * end

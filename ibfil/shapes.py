@@ -48,9 +48,7 @@ def node_arclength(filament: Filament, key: str = "filament") -> np.ndarray:
     return filament.length * x
 
 
-def initial_shape(
-    filament: Filament, key: str = "filament", folder: str | Path = "."
-) -> tuple[np.ndarray, np.ndarray]:
+def initial_shape(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:
     """Positions r (N, 3), in the case's length, and unit directors e1 (N, 3) at t = 0, in the lab frame.
 
     The shape's own curve and frame are placed (``placing.place``), then e1 is turned about e3 by the
@@ -87,9 +85,7 @@ def initial_shape(
     return r, e1
 
 
-def end_tangents(
-    filament: Filament, key: str = "filament", folder: str | Path = "."
-) -> tuple[np.ndarray, np.ndarray]:
+def end_tangents(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:
     """Tangents (3,), (3,) of the start shape at s = 0 and s = L: what a clamp holds by default.
 
     Those of the curve itself with ``perturb``, not of the nodes; ``noise`` is flat at clamped ends. Raises

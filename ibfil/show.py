@@ -81,7 +81,7 @@ def _plain(value: float | np.ndarray) -> float | list[float | None] | None:
 def _extent(run: RunFile, name: str) -> dict[str, Any]:
     """The range of a diagnostic over the run: of a vector, of its size."""
     values = np.asarray(run.diagnostics[name])
-    size = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
+    size = np.linalg.norm(values, axis=-1) if values.ndim > 1 else values
     return {"min": _plain(size.min()), "max": _plain(size.max()), "units": run.units(f"diagnostics/{name}")}
 
 

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 
-from . import assemble, timescales
-from .errors import RunFailed
+from . import assemble, driving, timescales
+from .errors import CaseError, RunFailed
 from .frames import FilamentFrame, Frame
 from .geometry import Geometry
-from .mechanics import TangentReversed
-from .stepping import NotConverged, State, Step
+from .loads import EndMoment
+from .marching import ControlledSteps, EvenSteps
+from .stepping import State, Step
 
 if TYPE_CHECKING:
     from .case import Case
     from .fields import GridFields
+    from .laws import MomentLaw
 
 _LONGEST, _SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
 _LARGEST_TWIST = 0.95  # of sin(O3 ds): Eq. 39 stops resisting at 1
 
 
 @njit(cache=True)
-def _survey(joined, ds, r, length, twist):
+def _survey(joined, twisting, ds, r, length, twist):
     """The largest and smallest |d|/ds, the largest |O3 ds|, the node of each; and the first node that is not finite."""
     high, low, turn = 0.0, np.inf, 0.0
     where = np.zeros(3, np.int64)
@@ -37,7 +41,7 @@ def _survey(joined, ds, r, length, twist):
                 high, where[0] = q, i
             if q < low:
                 low, where[1] = q, i
-            if abs(twist[i] * ds[i]) > turn:
+            if twisting[i] and abs(twist[i] * ds[i]) > turn:
                 turn, where[2] = abs(twist[i] * ds[i]), i
     return high, low, turn, where, -1
 
@@ -46,39 +50,44 @@ class Simulation:
     """One run of a case, at the present ``time`` after ``steps`` steps.
 
     ``method`` names the fluid's path, ``warnings`` what the user should know, ``grid`` the fluid's grid or None.
-    Raises CaseError where the scene cannot be built.
+    ``laws`` are constitutive laws made in Python, by filament, which go before the case's (laws.py). Raises CaseError
+    where the scene cannot be built.
     """
 
-    def __init__(self, case: Case, wisdom: str = "") -> None:
+    def __init__(self, case: Case, wisdom: str = "", laws: Mapping[str, MomentLaw] = MappingProxyType({})) -> None:
         self.case = case
-        self._rods = assemble.rods(case)
+        self._laws = ", ".join(f"{name}: {type(law).__qualname__}" for name, law in sorted(laws.items()))
+        self._rods = assemble.rods(case, laws)
         self.mechanics = self._rods.mechanics
         self._wisdom = wisdom
-        needs_plans = case.fluid.model != "rft" and case.fluid.method == "fft"
-        if needs_plans:
+        if case.fluid.model != "rft":
             self._learn()
-        self._fluid, self.method, self.grid = assemble.fluid(case, self._rods)
-        self._stepper = assemble.stepper(case)
+        self.fluid, self.method, self.grid = assemble.fluid(case, self._rods)
+        self._noise = assemble.noise(case, self._rods)
+        self._stepper = assemble.stepper(case, self._noise)
         n, m = len(self._rods.s), self.mechanics.unknowns
-        self._state = State(0.0, self._rods.start, np.zeros((n, m)), 0.0)
-        self.steps, self.shortened = 0, 0
-        self._iterations = 0
-        self._plan = (0.0, 0.0, 1, 0)  # interval start and end, its number of steps, those taken
+        self.state_now = State(0.0, self._rods.start, np.zeros((n, m)), 0.0)
+        # The e1 of a filament without twisting is carried along, and may come to differ from node to node.
+        self._twisting = np.repeat(
+            [f.twisting is not None for f in self._rods.filaments], [w.stop - w.start for w in self._rods.nodes]
+        )
+        self.steps = self._iterations = 0
+        self.notices: list[str] = []  # what has happened and nobody was told yet
         self._fields: GridFields | None = None
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        if needs_plans:
+        if self._transforms:
             self._remember()
-        self.step_length = self._choose_step()
+        self._march = self._choose_march()
 
     @property
     def time(self) -> float:
         """Present time, in the case's unit."""
-        return self._state.time
+        return self.state_now.time
 
     @property
     def shape(self) -> Geometry:
         """The present configuration of all nodes."""
-        return self._state.shape
+        return self.state_now.shape
 
     @property
     def start(self) -> Geometry:
@@ -91,8 +100,19 @@ class Simulation:
         return self._rods.s
 
     def nodes(self, name: str) -> slice:
-        """The range of nodes of the filament of that name."""
-        return self._rods.nodes[self._rods.names.index(name)]
+        """The range of nodes of the filament of that name, or of its first copy."""
+        names = self._rods.names
+        return self._rods.nodes[names.index(name if name in names else f"{name}_000")]
+
+    @property
+    def filaments(self) -> tuple[str, ...]:
+        """Names of all filaments, copies one by one."""
+        return self._rods.names
+
+    @property
+    def method_seconds(self) -> dict[str, float]:
+        """Estimated seconds of a step by each method the fluid has, from counts."""
+        return assemble.method_seconds(self.case, self._rods, self.grid)
 
     @property
     def groups(self) -> dict[str, float]:
@@ -111,11 +131,16 @@ class Simulation:
     @property
     def wisdom(self) -> str:
         """FFTW plans in use, as one line of text; empty where no step transforms a field."""
-        if self.method != "fft":
+        if not self._transforms:
             return ""
         from . import transforms
 
         return transforms.wisdom()
+
+    @property
+    def _transforms(self) -> bool:
+        """Whether steps transform fields."""
+        return self.method not in ("rft", "table")
 
     def _learn(self) -> None:
         from . import transforms
@@ -130,35 +155,16 @@ class Simulation:
     # -- how it goes on ------------------------------------------------------------------------------------------
 
     def driving_rates(self) -> list[float]:
-        """How fast the scene is driven, radians per time: curvature, spin, loads."""
-        case, rates = self.case, []
-        for filament in case.filaments.values():
-            s = np.linspace(0.0, filament.length, 101)
-            for expression in (*filament.curvature, filament.twist_rate):
-                if "t" in expression.variables:
-                    value = expression.bind("s", "t")
-                    rates.append(timescales.angular_rate(lambda t, v=value: v(s, t), case.time.end))  # type: ignore[misc]
-            for end in (filament.start, filament.finish):
-                rates += self._end_rates(filament, end)
-        return rates
+        """How fast the scene is driven, radians per time: by what changes in time, and by what pushes."""
+        return self._cycles + self._pushes
 
-    def _end_rates(self, filament, end) -> list[float]:
-        rates, horizon = [], self.case.time.end
-        if end.spin is not None:
-            spin = end.spin.bind("t")
-            rates.append(max(abs(float(spin(t))) for t in np.linspace(0.0, horizon, 101)))
-        if end.angle is not None:
-            angle = end.angle.bind("t")
-            times = np.linspace(0.0, horizon, 1001)
-            rates.append(float(np.max(np.abs(np.gradient([float(angle(t)) for t in times], times)))))
-        if end.follower is not None:
-            load = end.follower.bind("t")
-            size = max(abs(float(load(t))) for t in np.linspace(0.0, horizon, 101))
-            # A steady load has no period; it moves a rod by its length in zeta L^2/F.
-            rates.append(2 * np.pi * size / (self.drag(filament) * filament.length**2))
-            if "t" in end.follower.variables:
-                rates.append(timescales.angular_rate(lambda t: np.atleast_1d(load(t)), horizon))
-        return rates
+    @cached_property
+    def _cycles(self) -> list[float]:
+        return driving.cycles(self)
+
+    @cached_property
+    def _pushes(self) -> list[float]:
+        return driving.pushes(self)
 
     def drag(self, filament) -> float:
         """A drag per length across, for time scales: the case's own in RFT, 4 pi eta on a grid."""
@@ -172,66 +178,96 @@ class Simulation:
         """Relaxation time of the slowest bending mode of any filament."""
         times = []
         for f in self.case.filaments.values():
-            s = np.linspace(0.0, f.length, 11)
-            softest = min(float(np.min(a.bind("s", "t")(s, 0.0))) for a in f.bending)
             times.append(
-                timescales.bending_time(self.drag(f), f.length, softest, f.start.end, f.finish.end)
+                timescales.bending_time(self.drag(f), f.length, timescales.softest(f), f.start.end, f.finish.end)
             )
         return max(times)
 
     def explicit_limit(self) -> float:
         """The largest stable step of the explicit scheme at the present configuration, 2/rho(M K)."""
-        return timescales.explicit_limit(self.mechanics, self._fluid, self._state.shape, self.time)
+        return timescales.explicit_limit(self.mechanics, self.fluid, self.state_now.shape, self.time)
 
     def _choose_step(self) -> float:
         if self.case.time.step != "auto":
             return float(self.case.time.step)
         if self.case.time.scheme == "explicit":
             return 0.5 * self.explicit_limit()
-        return timescales.implicit_step(self.driving_rates(), self.bending_time())
+        step = timescales.implicit_step(self._cycles, self._pushes, self.bending_time())
+        if self._noise is not None:
+            # The trapezoid forgets its stiffest mode in dt^2/(2 limit): no later than the softest is forgotten.
+            step = min(step, float(np.sqrt(2 * self.explicit_limit() * self.bending_time())))
+            while self.thermal_stretch(step) > timescales.STRETCH:
+                step *= 0.9
+        return step
+
+    def thermal_stretch(self, dt: float) -> float:
+        """How much longer than at rest thermal kicks leave a filament on average in steps of dt; the most of all."""
+        assert self.case.thermal is not None
+        energy = self.case.thermal.energy
+        return max(
+            timescales.thermal_stretch(energy, self.drag(f), timescales.softest(f), f.length, f.nodes, dt)
+            for f in self.case.filaments.values()
+        )
+
+    def _choose_march(self) -> EvenSteps | ControlledSteps:
+        step, time = self._choose_step(), self.case.time
+        if time.tolerance is None:
+            return EvenSteps(step)
+        rate = 2 * np.pi / (timescales.POINTS_A_PERIOD * step)
+        return ControlledSteps(time.tolerance, rate, time.end, time.order, self.mechanics.length)
 
     def advance(self, until: float, after_step: Callable[[], None]) -> None:
-        """Goes on to exactly ``until``, in equal steps no longer than the step's length; calls back after each.
+        """Goes on to exactly ``until``; calls back after each step.
 
-        Raises RunFailed where the rods diverge, over-stretch, or the step cannot be solved.
+        Raises RunFailed where the rods diverge, over-stretch, or the step cannot be solved; Stopped at a contact
+        that ends the run.
         """
-        start, end, count, done = self._plan
-        if end != until or done >= count:
-            start, done = self.time, 0
-            count = max(1, int(np.ceil((until - start) / self.step_length * (1 - 1e-9))))
-        while done < count:
-            self._plan = (start, until, count, done)
-            goal = until if done + 1 == count else start + (until - start) * ((done + 1) / count)
-            self._step_to(goal)
-            done += 1
-            self._plan = (start, until, count, done)
-            after_step()
+        if self.steps == 0:
+            self._watch(self.state_now)
+        self._march.advance(self, until, after_step)
 
-    def _step_to(self, goal: float) -> None:
-        """One step, or as many halves as Newton needs."""
-        dt = goal - self.time
-        floor = self.case.time.min_step
-        while self.time < goal:
-            dt = min(dt, goal - self.time)
-            if goal - self.time - dt < 1e-9 * dt:
-                dt = goal - self.time
-            try:
-                step = self._stepper.step(self.mechanics, self._fluid, self._state, dt)
-            except (NotConverged, TangentReversed, np.linalg.LinAlgError) as error:
-                if 0.5 * dt < floor or self.case.time.scheme == "explicit":
-                    self._fail(str(error), None, "a shorter time.step, or a smoother start")
-                dt *= 0.5
-                self.shortened += 1
-                continue
-            self._accept(step, goal if goal - self.time - dt <= 0 else self.time + dt)
+    def attempt(self, dt: float) -> Step:
+        """A step of length dt from the present state, not yet taken."""
+        step = self._stepper.step(self.mechanics, self.fluid, self.state_now, dt)
+        if self._rods.contact is not None:
+            self._rods.contact.refuse_passing(self.state_now, step.state)
+        return step
 
-    def _accept(self, step: Step, time: float) -> None:
-        self._state = step.state._replace(time=time)
+    def may_halve(self, dt: float) -> bool:
+        """Whether a step that failed may be tried with half its length.
+
+        Not with noise: trying again only the steps whose kicks were large would bias them.
+        """
+        return 0.5 * dt >= self.case.time.min_step and self.case.time.scheme != "explicit" and self._noise is None
+
+    def give_up(self, reason: str, dt: float, node: int | None = None) -> None:
+        """Raises RunFailed: no step of length dt can be taken, because of ``node`` if that is known."""
+        self._fail(f"{reason} (dt = {dt:.3g})", node, self._advice())
+
+    @property
+    def shortened(self) -> int:
+        """How many steps had to be tried again with a shorter one."""
+        return self._march.shortened
+
+    @property
+    def step_length(self) -> float:
+        """The longest step, or with a tolerance the present one."""
+        return self._march.length
+
+    def accept(self, step: Step, time: float) -> None:
+        """Takes a step, which led to ``time``. Raises RunFailed where it led out of bounds, Stopped at a contact."""
+        before, self.state_now = self.state_now, step.state._replace(time=time)
         self._last = (step.velocity, step.force, step.reaction)
         self.steps += 1
+        if self.steps > self.case.time.max_steps:
+            self._fail(
+                f"time.max_steps = {self.case.time.max_steps} steps are taken",
+                None,
+                "a larger time.max_steps, a longer time.step, or a larger time.tolerance",
+            )
         self._iterations = step.iterations
         shape, mesh = step.state.shape, self.mechanics.mesh
-        high, low, turn, where, bad = _survey(mesh.joined, mesh.ds, shape.r, shape.length, shape.twist)
+        high, low, turn, where, bad = _survey(mesh.joined, self._twisting, mesh.ds, shape.r, shape.length, shape.twist)
         if bad >= 0:
             self._fail("a position is not finite: the run diverged", bad, self._advice())
         if high > _LONGEST or low < _SHORTEST:
@@ -247,6 +283,18 @@ class Simulation:
                 int(where[2]),
                 "more nodes, a shorter time.step, or a slower spin",
             )
+        self._watch(before)
+
+    def _watch(self, before: State) -> None:
+        """Looks for a contact since ``before``, where the case has [contact]."""
+        if self._rods.contact is not None:
+            told = self._rods.contact.watch(before, self.state_now)
+            self.notices += [told] if told else []
+
+    @property
+    def contacts(self) -> int:
+        """How many pairs of segments touch now; zero where the case has no [contact]."""
+        return 0 if self._rods.contact is None else self._rods.contact.near(self.shape.r).i.size
 
     def _advice(self) -> str:
         if self.case.time.scheme == "explicit":
@@ -255,26 +303,25 @@ class Simulation:
 
     def explicit_limit_or_nan(self) -> float:
         """The explicit limit at the start shape, for messages when the present one is no longer finite."""
-        return timescales.explicit_limit(self.mechanics, self._fluid, self._rods.start, 0.0)
+        return timescales.explicit_limit(self.mechanics, self.fluid, self._rods.start, 0.0)
 
     def _fail(self, message: str, node: int | None, advice: str) -> None:
-        name = None
-        if node is not None:
-            for name, where in zip(self._rods.names, self._rods.nodes, strict=True):
-                if where.start <= node < where.stop:
-                    node -= where.start
-                    break
-        raise RunFailed(message, time=self.time, filament=name, node=node, advice=advice)
+        if node is None:
+            raise RunFailed(message, time=self.time, advice=advice)
+        k = next(k for k, where in enumerate(self._rods.nodes) if node < where.stop)
+        where = self._rods.nodes[k]
+        name = self._rods.names[k]
+        raise RunFailed(message, time=self.time, filament=name, node=node - where.start, advice=advice)
 
     # -- what is looked at ---------------------------------------------------------------------------------------
 
     def _motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Velocity, force on the fluid and reaction (n, m): of the last step, or of the start."""
         if self._last is None:
-            force, _ = self.mechanics.forces(self._state.shape, self.time)
-            small = 1e-6 * self.step_length
+            force, _ = self.mechanics.forces(self.state_now.shape, self.time)
+            small = 1e-6 * self.case.time.end / 1000
             held = self.mechanics.held(self.time, self.time + small)
-            response = self._fluid.response(self._state.shape.r, self._state.shape.e3, self.time, small)
+            response = self.fluid.response(self.state_now.shape.r, self.state_now.shape.e3, self.time, small)
             answer = response.forced(force, held, np.zeros_like(force))
             self._last = (answer.move / small, answer.force, answer.reaction)
         return self._last
@@ -282,12 +329,10 @@ class Simulation:
     def frame(self, fields: Sequence[str] = ()) -> Frame:
         """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
         velocity, force, reaction = self._motion()
-        shape = self._state.shape
+        shape = self.state_now.shape
         moment, strain = self._nodal_moment()
         filaments = {}
-        for name, description, where in zip(
-            self._rods.names, self._rods.filaments, self._rods.nodes, strict=True
-        ):
+        for name, description, where in zip(self._rods.names, self._rods.filaments, self._rods.nodes, strict=True):
             segment = slice(where.start, where.stop - 1)
             stretch = shape.length[segment] / self.mechanics.mesh.ds[segment] - 1.0
             ends = (
@@ -309,29 +354,41 @@ class Simulation:
 
     def _nodal_moment(self) -> tuple[np.ndarray, np.ndarray]:
         """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""
-        shape, mesh = self._state.shape, self.mechanics.mesh
+        shape, mesh = self.state_now.shape, self.mechanics.mesh
         moment = self.mechanics.moment(shape, self.time)
         beside = mesh.joined.astype(float) + np.append(False, mesh.joined[:-1])
         thirds = []
         for half in (moment.twist, shape.twist):
             half = np.where(mesh.joined, half, 0.0)
             thirds.append((half + np.append(0.0, half[:-1])) / beside)
-        return np.column_stack([moment.bend, thirds[0]]), np.column_stack([shape.bend, thirds[1]])
+        nodal = np.column_stack([moment.bend, thirds[0]])
+        for load in self.mechanics.loads:
+            if isinstance(load, EndMoment):  # the law's own is zero there
+                i = int(load.node[0])
+                nodal[i] = np.stack([shape.e1[i], shape.e2[i], shape.e3[i]]) @ load.moment(shape, self.time)
+        return nodal, np.column_stack([shape.bend, thirds[1]])
 
     def _diagnostics(self, velocity: np.ndarray, force: np.ndarray) -> dict[str, float | np.ndarray]:
-        shape, mesh = self._state.shape, self.mechanics.mesh
+        shape, mesh = self.state_now.shape, self.mechanics.mesh
         stretch = (shape.length / mesh.ds)[mesh.joined] - 1.0
         torque = np.cross(shape.r, force[:, :3]).sum(axis=0)
         if force.shape[1] == 4:
             torque = torque + (force[:, 3:] * shape.e3).sum(axis=0)
-        return {
+        out: dict[str, float | np.ndarray] = {
             "net_force": force[:, :3].sum(axis=0),
             "net_torque": torque,
             "stretch_max": float(stretch.max()),
             "stretch_min": float(stretch.min()),
             "power": float(np.sum(velocity * force)),
             "newton_iterations": float(self._iterations),
+            "steps_shortened": float(self.shortened),
         }
+        if self.grid is not None and self.case.output.probes:
+            points = np.array(self.case.output.probes)
+            out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, force[:, :3], self.time)
+        if self._rods.contact is not None:
+            out |= {"contacts": float(self.contacts), "first_contact": self._rods.contact.since}
+        return out
 
     def _grid_fields(self, fields: Sequence[str], force: np.ndarray) -> dict[str, np.ndarray]:
         """Fields on the grid: one evaluation of the fluid."""
@@ -340,51 +397,51 @@ class Simulation:
             from .fields import GridFields
 
             fluid = self.case.fluid
-            self._fields = GridFields(
-                self.grid, fluid.viscosity, assemble.flow(self.case), self.case.compute.threads
-            )
-        base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(self._state.shape.r))
+            self._fields = GridFields(self.grid, fluid.viscosity, assemble.flow(self.case), self.case.compute.threads)
+        base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(self.state_now.shape.r))
         return self._fields.evaluate(base, weights, np.ascontiguousarray(force[:, :3]), self.time, fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
 
     def state(self) -> dict[str, np.ndarray | float | int | str]:
         """All that is needed to go on bit for bit, also between two outputs."""
-        shape = self._state.shape
+        shape = self.state_now.shape
         velocity, force, reaction = self._motion()
-        start, end, count, done = self._plan
         return {
             "time": self.time,
             "steps": self.steps,
-            "shortened": self.shortened,
             "iterations": self._iterations,
             "position": shape.r,
             "e1": shape.e1,
-            "y_old": self._state.y_old,
-            "dt_old": self._state.dt_old,
+            "y_old": self.state_now.y_old,
+            "dt_old": self.state_now.dt_old,
             "velocity": velocity,
             "force": force,
             "reaction": reaction,
-            "plan_start": start,
-            "plan_end": end,
-            "plan_count": count,
-            "plan_done": done,
-            "step_length": self.step_length,
+            **{f"march_{key}": value for key, value in self._march.state().items()},
+            **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
+            **({} if self._noise is None else {"random": self._noise.state()}),
+            **({} if self._rods.contact is None else {"first_contact": self._rods.contact.since}),
+            **({"laws": self._laws} if self._laws else {}),
         }
 
     def restore(self, state: dict[str, np.ndarray | float | int | str]) -> None:
-        """Takes up a state that ``state`` gave."""
+        """Takes up a state that ``state`` gave. Raises CaseError where it was made with other laws from Python."""
+        if state.get("laws", "") != self._laws:
+            found, wanted = self._laws or "none", state.get("laws") or "none"
+            raise CaseError([f"{self.case.file}: laws: found {found}; the run began with {wanted}"])
         array = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
         number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
         shape = self.mechanics.measure(array["position"], array["e1"])
-        self._state = State(number["time"], shape, array["y_old"], number["dt_old"])
+        self.state_now = State(number["time"], shape, array["y_old"], number["dt_old"])
         self._last = (array["velocity"], array["force"], array["reaction"])
-        self.steps, self.shortened = int(number["steps"]), int(number["shortened"])
-        self._iterations = int(number["iterations"])
-        self._plan = (
-            number["plan_start"],
-            number["plan_end"],
-            int(number["plan_count"]),
-            int(number["plan_done"]),
-        )
-        self.step_length = number["step_length"]
+        self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
+        march = {k.removeprefix("march_"): v for k, v in (array | number).items() if k.startswith("march_")}
+        self._march.restore(march)
+        memory = {k.removeprefix("fluid_"): v for k, v in (array | number).items() if k.startswith("fluid_")}
+        if memory:
+            self.fluid.recall(memory)
+        if self._noise is not None:
+            self._noise.restore(str(state["random"]))
+        if self._rods.contact is not None:
+            self._rods.contact.since = number["first_contact"]

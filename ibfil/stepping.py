@@ -17,6 +17,7 @@ import numpy as np
 
 from .fluid import Answer, Fluid, Held, Response
 from .geometry import Geometry
+from .mechanics import TangentReversed
 
 
 class State(NamedTuple):
@@ -57,7 +58,14 @@ class Rods(Protocol):
 
 
 class NotConverged(Exception):
-    """Newton's iteration did not converge; the step may be repeated with a shorter dt."""
+    """Newton's iteration did not converge, least at ``node``; the step may be repeated with a shorter dt."""
+
+    def __init__(self, message: str, node: int) -> None:
+        super().__init__(message)
+        self.node = node
+
+
+FAILURES = (NotConverged, TangentReversed, np.linalg.LinAlgError)  # of a step: it may be tried again
 
 
 class Stepper(Protocol):
@@ -69,6 +77,11 @@ class Stepper(Protocol):
 
     def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
         """From ``state`` to ``state.time + dt``. Raises NotConverged."""
+
+
+def _size(move: np.ndarray, length: float) -> float:
+    """The largest displacement in units of the length, or turn in radians."""
+    return float(max(np.max(np.abs(move[:, :3])) / length, np.max(np.abs(move[:, 3:]), initial=0.0)))
 
 
 def _finish(rods: Rods, state: State, dt: float, y: np.ndarray, velocity, answer: Answer, count: int) -> Step:
@@ -85,7 +98,7 @@ class Explicit:
     def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
         """One evaluation of the force, one answer of the fluid."""
         force, _ = rods.forces(state.shape, state.time)
-        target = np.zeros_like(force)
+        target = np.zeros(force.shape)
         response = fluid.response(state.shape.r, state.shape.e3, state.time, dt)
         answer = response.forced(force, rods.held(state.time, state.time + dt), target)
         return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 0)
@@ -105,10 +118,39 @@ class SemiImplicit:
         after = state.time + dt
         force, inner = rods.forces(state.shape, after)
         matrix = rods.stiffness(state.shape, state.shape, inner, after, True)
-        zero = np.zeros_like(force)
+        zero = np.zeros(force.shape)
         response = fluid.response(state.shape.r, state.shape.e3, after, dt)
         answer = response.implicit(force, matrix, rods.held(state.time, after), zero, zero)
         return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 1)
+
+
+class _Equation(NamedTuple):
+    """What a step has to solve: y = target + tau (u0 + M (f(y) + R)), displacements y from ``start``."""
+
+    rods: Rods
+    response: Response
+    start: Geometry
+    time: float
+    target: np.ndarray  # (n, m)
+    held: Held
+
+    def correction(self, y: np.ndarray, shape: Geometry, clip: bool, most: float) -> tuple[Answer, float]:
+        """Newton's correction of y and its size; clipped too where an exact one is larger than ``most``."""
+        force, inner = self.rods.forces(shape, self.time)
+        while True:
+            matrix = self.rods.stiffness(shape, self.start, inner, self.time, clip)
+            answer = self.response.implicit(force, matrix, self.held, y, self.target)
+            size = _size(answer.move, self.rods.length)
+            if clip or size <= most:
+                return answer, size
+            clip = True
+
+
+def _stride(move: np.ndarray, shape: Geometry) -> float:
+    """The largest change of a segment, relative to its length."""
+    joined = shape.gap[:-1].any(axis=1)
+    change = np.linalg.norm(np.diff(move[:, :3], axis=0), axis=1)
+    return float(np.max(change[joined] / shape.length[:-1][joined]))
 
 
 @dataclass(frozen=True)
@@ -117,45 +159,55 @@ class Implicit:
 
     M is taken at the extrapolated positions; the first iteration leaves compressive geometric stiffness out of the
     matrix, and so does any that makes the correction grow. Two or three iterations are usual.
+
+    It begins at the start of the step, from where whole corrections fail least. Where they do, as on soft rods of
+    many nodes, whose ends move by more than a segment in a step, it goes a second time: from the extrapolated
+    positions, with corrections cut to what changes no segment by more than ``stride`` of itself.
     """
 
     order: int = 2
-    tolerance: float = 1e-8  # of the length, largest correction of a node
-    most: int = 12
+    tolerance: float = 1e-8  # largest correction of a node: of the length, and in radians of its turn
+    most: int = 12  # iterations, each time
+    stride: float = 0.1  # of a segment
 
     def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
-        """Newton to ``tolerance``, or NotConverged after ``most`` iterations."""
+        """Newton to ``tolerance``. Raises one of FAILURES, NotConverged after ``most`` iterations among them."""
         w = dt / state.dt_old if self.order == 2 and state.dt_old > 0 else 0.0
         tau, target = dt * (1 + w) / (1 + 2 * w), (w * w / (1 + 2 * w)) * state.y_old
-        after = state.time + dt
-        there = rods.move(state.shape, w * state.y_old) if w else state.shape
-        response = fluid.response(there.r, there.e3, after, tau)
-        held = rods.held(state.time, after)
-        y, answer, count = self._newton(rods, response, state, after, target, held)
+        after, ahead = state.time + dt, w * state.y_old
+        there = rods.move(state.shape, ahead) if w else state.shape
+        equation = _Equation(
+            rods,
+            fluid.response(there.r, there.e3, after, tau),
+            state.shape,
+            after,
+            target,
+            rods.held(state.time, after),
+        )
+        try:
+            y, answer, count = self._newton(equation, np.zeros(target.shape), state.shape, None)
+        except FAILURES:
+            y, answer, count = self._newton(equation, ahead, there, self.stride)
         return _finish(rods, state, dt, y, (y - target) / tau, answer, count)
 
     def _newton(
-        self, rods: Rods, response: Response, state: State, after: float, target: np.ndarray, held: Held
+        self, equation: _Equation, y: np.ndarray, shape: Geometry, stride: float | None
     ) -> tuple[np.ndarray, Answer, int]:
-        y = np.zeros_like(target)
-        shape, clip, last = state.shape, True, np.inf
+        """From y, where the rods have ``shape``, to the solution: its y, the last answer, the iterations it took.
+
+        ``stride``: the largest change of a segment by a correction; None: corrections are whole.
+        """
+        clip, last = True, np.inf
         for count in range(1, self.most + 1):
-            force, inner = rods.forces(shape, after)
-            answer = response.implicit(
-                force, rods.stiffness(shape, state.shape, inner, after, clip), held, y, target
-            )
-            size = float(np.max(np.abs(answer.move[:, :3])))
-            if not clip and size > 4 * last:
-                answer = response.implicit(
-                    force, rods.stiffness(shape, state.shape, inner, after, True), held, y, target
-                )
-                size = float(np.max(np.abs(answer.move[:, :3])))
+            answer, size = equation.correction(y, shape, clip, 4 * last)
             if not np.isfinite(size):
                 break
-            y = y + answer.move
+            part = 1.0 if stride is None else min(1.0, stride / max(_stride(answer.move, shape), 1e-300))
+            y = y + part * answer.move
             # Newton squares the error, so two exact corrections in a row tell the size of the next.
             coming = size * (size / last) ** 2 if not clip and count > 2 else size
-            if coming < self.tolerance * rods.length:
+            if part == 1.0 and coming < self.tolerance:
                 return y, answer, count
-            shape, clip, last = rods.move(state.shape, y), False, size
-        raise NotConverged(f"no convergence in {count} iterations, last correction {size:.2g}")
+            shape, clip, last = equation.rods.move(equation.start, y), False, size
+        worst = int(np.argmax(np.max(np.abs(answer.move), axis=1)))
+        raise NotConverged(f"no convergence in {count} iterations, last correction {size:.2g}", worst)

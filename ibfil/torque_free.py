@@ -3,7 +3,7 @@
 Eq. 44 conserves force exactly and torque only to O(strain) where the rod is unevenly stretched. Here (derivations.md,
 section 3) the tangent is the bisector of the neighbouring segments, and the fluxes hold the true distances:
 
-    u = d/|d|,  s_i = (u_{i-1/2} + u_{i+1/2})/(1 + u_{i-1/2}.u_{i+1/2}),  e3_i = s_i/|s_i|;   s_1 = u_{3/2}, s_N = u_{N-1/2}
+    u = d/|d|,  s_i = (u_{i-1/2} + u_{i+1/2})/(1 + u_{i-1/2}.u_{i+1/2}),  s_1 = u_{3/2}, s_N = u_{N-1/2},  e3 = s/|s|
     F_{i+1/2} = [Q_{i+1} - Q_i + M3_{i+1/2} u x (s_{i+1} - s_i)]/|d| + F'3 d/ds,     Q = M1 e2 - M2 e1
     tau_i     = |s_i| (M3_{i+1/2} - M3_{i-1/2}) - (u_{i+1/2} - u_{i-1/2}).M_i
 
@@ -20,7 +20,7 @@ from .frame import carry
 from .geometry import Geometry
 from .mechanics import Mechanics, TangentReversed
 from .rods import Mesh
-from .variation import Variation
+from .variation import Shift, Variation
 
 
 def _before(values: np.ndarray) -> np.ndarray:
@@ -85,8 +85,18 @@ def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Geometry:
     bend = np.stack([-_dot(e2, d2), _dot(e1, d2)], axis=1)
     twist = np.zeros(len(r))
     twist[:-1] = _dot(e2[:-1] + e2[1:], e1[1:] - e1[:-1]) / (2 * mesh.ds[:-1])
-    return Geometry(
-        r, e1, e2, b.e3, b.size, b.s, d2, bend, np.where(mesh.joined, twist, 0.0), b.gap, b.length
+    return Geometry.of(
+        r=r,
+        e1=e1,
+        e2=e2,
+        e3=b.e3,
+        speed=b.size,
+        d1=b.s,
+        d2=d2,
+        bend=bend,
+        twist=np.where(mesh.joined, twist, 0.0),
+        gap=b.gap,
+        length=b.length,
     )
 
 
@@ -118,16 +128,16 @@ class TorqueFree(Mechanics):
             raise TangentReversed(int(np.argmin(_dot(start.e3, b.e3))))
         return measure(self.mesh, r, e1)
 
-    def _tension(self, g: Geometry, moment: Moment) -> np.ndarray:
+    def _tension(self, g: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:
         p = _dot(moment.bend, g.bend)
-        return self.stretching * (1 - self.mesh.ds / g.length) - 0.5 * (p + _next(p))
+        return stretching * (1 - self.mesh.ds / g.length) - 0.5 * (p + _next(p))
 
-    def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Moment]:
-        """Nodal forces (n, 3), or with the twist torque (n, 4), and the moments they come from."""
-        moment, mesh = self.moment(shape, time), self.mesh
+    def elastic(self, shape: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:
+        """Nodal forces (n, 3), or with the twist torque (n, 4), for given moments and axial stiffness (n,)."""
+        mesh = self.mesh
         force = np.zeros((len(shape.r), self.unknowns))
         flux = self._bending_flux(shape, moment)
-        flux += (self._tension(shape, moment) / mesh.ds)[:, None] * shape.gap
+        flux += (self._tension(shape, moment, stretching) / mesh.ds)[:, None] * shape.gap
         flux[~mesh.joined] = 0.0
         force[:, :3] = flux - _before(flux)
         if self.unknowns == 4:
@@ -135,9 +145,7 @@ class TorqueFree(Mechanics):
             force[:, 3] = shape.speed * (moment.twist - _before(moment.twist)) - _dot(
                 self._kink(u), self._vector(shape, moment)
             )
-        for load in self.loads:
-            load.add_force(shape, time, force)
-        return force, moment
+        return force
 
     def _kink(self, u: np.ndarray) -> np.ndarray:
         """u_{i+1/2} - u_{i-1/2}, with the tangent of a clamp in place of the segment that is not there."""
@@ -153,31 +161,28 @@ class TorqueFree(Mechanics):
         turn = np.cross(g.gap, _next(g.d1) - g.d1) * (moment.twist / g.length)[:, None]
         return (_next(q) - q + turn) / g.length[:, None]
 
-    def stiffness(
-        self, shape: Geometry, start: Geometry, moment: Moment, time: float, clip: bool
-    ) -> np.ndarray:
+    def stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, clip: bool) -> np.ndarray:
         """The exact Jacobian of ``forces``, by bands."""
         matrix = _Jacobian(self, shape, start, moment, clip).matrix
-        variation = _BisectorVariation(self.mesh, shape, start, matrix)
-        for load in self.loads:
-            load.add_stiffness(time, variation)
+        self._add_stiffness(_BisectorVariation(self.mesh, shape, start, matrix), time)
         return matrix
 
 
 class _BisectorVariation(Variation):
     """Tangents are those of bisectors: they change with the segments beside a node, not with a stencil."""
 
-    def tangent(self, nodes: np.ndarray, rows: np.ndarray, shift: int = 0) -> None:
+    def tangent(self, nodes: np.ndarray, rows: np.ndarray, shift: Shift = 0) -> None:
         """rows de3, de3 = (1 - e3 e3) ds/|s|."""
         b = _Bisectors(self.mesh, self.shape.r)
         on_s = rows @ self.across(nodes)
         rigid = (np.eye(3) - _outer(b.u, b.u)) / b.length[:, None, None]
+        shift = np.broadcast_to(shift, nodes.shape)
         for has, change, segment in ((b.has_right, b.on_right, 0), (b.has_left, b.on_left, -1)):
             ok = has[nodes]
-            at = nodes[ok]
+            at, to = nodes[ok], shift[ok]
             part = on_s[ok] @ change[at] @ rigid[at + segment]
-            self.position(at + segment + 1, part, shift - segment - 1)
-            self.position(at + segment, -part, shift - segment)
+            self.position(at + segment + 1, part, to - segment - 1)
+            self.position(at + segment, -part, to - segment)
 
 
 class _Jacobian:
@@ -187,9 +192,7 @@ class _Jacobian:
     and with its turn dpsi = dphi + (e3 x old).de3/(1 + old.e3); each flux with the two nodes beside it, and with dd.
     """
 
-    def __init__(
-        self, rods: TorqueFree, g: Geometry, start: Geometry, moment: Moment, clip: bool
-    ) -> None:
+    def __init__(self, rods: TorqueFree, g: Geometry, start: Geometry, moment: Moment, clip: bool) -> None:
         self.mesh, self.g, self.m3 = rods.mesh, g, moment.twist
         self.m, self.w = rods.unknowns, rods.profile.width
         self.b = _Bisectors(rods.mesh, g.r)
@@ -230,7 +233,7 @@ class _Jacobian:
     def _segments(self, rods: TorqueFree, moment: Moment, clip: bool) -> None:
         """The part of each flux on its own dd: 1/|d|, du in the twist term, tension."""
         g, b = self.g, self.b
-        tension = rods._tension(g, moment)
+        tension = rods._tension(g, moment, rods.stretching)
         tension = (np.maximum(tension, 0.0) if clip else tension) / self.mesh.ds
         direct = _outer(b.u, b.u) * (rods.stretching / b.length)[:, None, None]
         direct = direct + tension[:, None, None] * np.eye(3)
@@ -293,9 +296,7 @@ class _Jacobian:
     def _source(self, kink: np.ndarray, bent: np.ndarray) -> None:
         """The torque's part that is no flux: (M3_{i+1/2} - M3_{i-1/2}) d|s| - du.M - kink.dM."""
         n = len(kink)
-        second, slope, spin = (
-            -np.einsum("ia,ia...->i...", kink, part) for part in self.vector
-        )
+        second, slope, spin = (-np.einsum("ia,ia...->i...", kink, part) for part in self.vector)
         slope = slope + spin[:, None] * self.turn
         jump = (self.m3 - _before(self.m3))[:, None] * self.g.e3
         row = np.zeros((n, 4, 3))

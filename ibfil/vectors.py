@@ -1,20 +1,28 @@
-"""Three-vectors as tuples of numbers, for compiled loops over nodes: they stay in registers where slices do not."""
+"""Three-vectors as tuples of numbers, for compiled loops over nodes: they stay in registers where slices do not.
+
+A function that takes arrays is put in line before types are known (``inline="always"``): a call would cost an atomic
+count of references for every array.
+"""
 
 from __future__ import annotations
 
 from numba import njit
 
-
-@njit(cache=True)
-def at(a, i):
-    """The vector ``a[i]`` of an array (n, 3)."""
-    return a[i, 0], a[i, 1], a[i, 2]
+# An index that may be negative is wrapped at every use, and a loop over it is not vectorised. Masked with this, one
+# that is not negative anyway is known to be so by the compiler too.
+NOT_NEGATIVE = 0x7FFFFFFF
 
 
-@njit(cache=True)
-def put(a, i, v):
-    """Writes the vector into ``a[i]``."""
-    a[i, 0], a[i, 1], a[i, 2] = v[0], v[1], v[2]
+@njit(cache=True, inline="always")
+def at(a, i, c):
+    """The vector in row i of ``a`` (n, columns) from column c."""
+    return a[i, c], a[i, c + 1], a[i, c + 2]
+
+
+@njit(cache=True, inline="always")
+def put(a, i, c, v):
+    """Writes a vector into row i of ``a`` (n, columns) from column c."""
+    a[i, c], a[i, c + 1], a[i, c + 2] = v[0], v[1], v[2]
 
 
 @njit(cache=True, fastmath={"contract"})

@@ -80,6 +80,7 @@ class FakeSimulation:
     def __init__(self, case: Case, wisdom: str = "", *, fails_at: float = np.inf, pause: float = 0.0) -> None:
         self.case, self.fails_at, self.pause = case, fails_at, pause
         self.time, self.steps = 0.0, 0
+        self.notices: list[str] = []
         ((name, filament),) = case.filaments.items()
         self.name = name
         self.y = np.linspace(0.1, 0.9, filament.nodes)

@@ -119,7 +119,7 @@ def twisting_rod(
         "twisting": "0.7*A",
         "stretching": f"{stretching}*A/L**2",
         "radius": "L/20",
-        "curvature": [f"300/L*{grow}*{fade}*s/L", f"80/L*{grow}*{fade}"],
+        "curvature": [f"300/L*{grow}*{fade}*s/L", f"150/L*{grow}*{fade}"],
         "twist_rate": f"60/L*{grow}*{fade}",
         "anchor": "start",
         "direction": [1, 0, 0],

@@ -22,12 +22,8 @@ def test_frame_equations_are_integrated_to_sixth_order() -> None:
 
 
 def test_frames_stay_orthonormal_over_many_turns() -> None:
-    _, frame = integrate_frame(
-        lambda s: np.tile([300.0, 0.0, 400.0], (s.size, 1)), np.linspace(0.0, 1.0, 200)
-    )
-    np.testing.assert_allclose(
-        frame.transpose(0, 2, 1) @ frame, np.broadcast_to(np.eye(3), (200, 3, 3)), atol=1e-12
-    )
+    _, frame = integrate_frame(lambda s: np.tile([300.0, 0.0, 400.0], (s.size, 1)), np.linspace(0.0, 1.0, 200))
+    np.testing.assert_allclose(frame.transpose(0, 2, 1) @ frame, np.broadcast_to(np.eye(3), (200, 3, 3)), atol=1e-12)
 
 
 def test_formula_of_an_arc_is_that_arc() -> None:
@@ -80,9 +76,7 @@ def test_formulas_without_a_tangent_are_refused_in_one_line() -> None:
 
     assert refused("s**2", "0*s", "0*s") == "filament.rod.shape.r: dr/ds vanishes at node 0"
     assert refused("abs(s - 0.51)", "0*s", "0*s").endswith("the tangent reverses between nodes 20 and 21")
-    assert refused("s", "log(s)", "0*s").startswith(
-        "filament.rod.shape.r.1: not a finite number at s = 0: log(s)"
-    )
+    assert refused("s", "log(s)", "0*s").startswith("filament.rod.shape.r.1: not a finite number at s = 0: log(s)")
     overlap = fault(rod(shape={"perturb": ["-min(s, 0.1)", 0, 0]}))
     assert overlap == "filament.rod.shape: nodes 0 and 1 start at the same point"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import NoEnds, bare
+from scenes import NoEnds, bare, slopes
 
 from ibfil import banded
 from ibfil.elasticity import Moment, nodal_force
@@ -77,6 +77,23 @@ def test_a_stretched_rod_pulls_its_ends_in_by_the_stiffness_times_the_strain(
     expected = np.zeros((nodes, 4))
     expected[0, 0], expected[-1, 0] = pull, -pull
     assert np.abs(force - expected).max() < 1e-11
+
+
+@KINDS
+@pytest.mark.parametrize("derivative", [2, 6])
+def test_a_rod_in_pure_bending_bears_no_force(kind: type[Mechanics], derivative: int) -> None:
+    """On an arc of curvature k, Q' = A k^2 e3 along the rod; P = A k^2 in the tension takes it away."""
+    left = []
+    for nodes in (17, 33, 65):
+        s = np.linspace(0.0, 1.0, nodes)
+        k = 3.0
+        r = np.stack([np.sin(k * s) / k, (1 - np.cos(k * s)) / k, np.zeros(nodes)], axis=1)
+        rods = bare([Segmented(s, derivative, None, None)], kind=kind)
+        force, _ = rods.forces(rods.start(r, np.tile([0.0, 0.0, 1.0], (nodes, 1))), 0.0)
+        through = np.cumsum(force[:, :3], axis=0)[nodes // 8 : -(nodes // 8)]
+        left.append(float(np.abs(through).max()))
+    assert slopes(left) == pytest.approx([2.0, 2.0], abs=0.1)
+    assert left[-1] < 0.01 * k**2
 
 
 @KINDS

@@ -134,7 +134,7 @@ def loaded(**keys: Any) -> Case:
         "nodes": 9,
         "bending": [1.0, 0.5],
         "stretching": 100.0,
-        "curvature": [1.0, 0.5],
+        "curvature": ["2*cos(3*s)", "s"],
         "start": {**CLAMPED, "spin": 3.0},
         "finish": {"follower": -2.0},
         **keys,
@@ -165,21 +165,23 @@ def test_the_force_on_the_fluid_is_the_drag_of_the_velocity(scheme: stepping.Ste
 def test_reactions_and_loads_balance_the_drag(scheme: str, spun_only: bool) -> None:
     """Eq. 44 adds nothing to the sum, so the support gives what the load and the drag leave, at every step.
 
-    Newton's last correction d is below 1e-8: the load, linearised in it, is off by d^2.
+    Newton leaves positions to 1e-8 of the length, and with them the direction of the load: the drag of moving
+    the whole rod by that in a step. Without a load nothing is left but round-off.
     """
-    case = loaded(finish={}) if spun_only else loaded()
-    for _, step in steps(case, SCHEMES[scheme], 0.02, 6):
+    case, dt = loaded(finish={}) if spun_only else loaded(), 0.02
+    left = 1e-12 if spun_only else 4 * np.pi * 0.7 * 1e-8 / dt
+    for _, step in steps(case, SCHEMES[scheme], dt, 6):
         load = np.zeros(3) if spun_only else -2.0 * step.state.shape.e3[-1]
         drag, reaction = step.force[:, :3].sum(axis=0), step.reaction[:, :3].sum(axis=0)
         assert np.linalg.norm(reaction) > 0.1
-        assert drag == pytest.approx(reaction + load, abs=1e-10)
+        assert drag == pytest.approx(reaction + load, abs=left)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_reactions_act_at_held_unknowns_and_nowhere_else(scheme: stepping.Stepper) -> None:
     for _, step in steps(loaded(), scheme, 2e-4, 3):
         assert np.all(step.reaction[1:] == 0.0)
-        assert np.all(step.reaction[0] != 0.0)
+        assert np.all(step.reaction[0, 1:] != 0.0)
 
 
 def test_the_clamp_of_a_twirling_rod_gives_the_torque_that_turns_all_of_it() -> None:
@@ -187,8 +189,7 @@ def test_the_clamp_of_a_twirling_rod_gives_the_torque_that_turns_all_of_it() -> 
     spin, zeta = 2.0, 4 * np.pi * 0.05**2
     case = scene({"rod": {**ROD, **TWIST, "start": {**CLAMPED, "spin": spin}}})
     settle = 30 * zeta / (np.pi / 2) ** 2
-    for _, step in steps(case, stepping.Implicit(1), settle / 100, 400):
-        pass
+    *_, (_, step) = steps(case, stepping.Implicit(1), settle / 100, 400)
     assert step.reaction[0, 3] == pytest.approx(zeta * spin, rel=1e-6)
     assert step.force[:, 3].sum() == pytest.approx(zeta * spin, rel=1e-6)
 
@@ -228,8 +229,8 @@ def test_its_clamp_carries_the_moment_of_the_load_to_second_order(derivative: in
         moment = simulation.mechanics.moment(shape, 0.0).bend[0]
         clamp = moment[0] * shape.e1[0] + moment[1] * shape.e2[0]
         errors.append(float(np.linalg.norm(clamp - lever)))
-    assert min(slopes(errors)) >= 1.8
-    assert errors[-1] < 2e-3
+    assert min(slopes(errors)) >= 1.9
+    assert errors[-1] < 1e-3
 
 
 @pytest.mark.parametrize("m", [3, 4])
@@ -282,16 +283,17 @@ def test_without_stiffness_the_reaction_is_what_the_prescribed_velocity_needs(m:
     drag = rft.Drag(*(rng.uniform(1.0, 2.0, n) for _ in range(3)))
     e3 = np.tile([0.6, 0.8, 0.0], (n, 1))
     force = rng.standard_normal((n, m))
-    held = Held(np.array([0, 1, 2, n * m - 1]), rng.standard_normal(4))
+    held = Held(np.arange(m), rng.standard_normal(m))
     where = banded.profile(assemble.rods(scene({"rod": {**ROD, "nodes": 8}})).mechanics.mesh)
-    answer = (
-        rft.ResistiveForce(drag, where).response(np.zeros((n, 3)), e3, 0.0, tau).forced(force, held, np.zeros((n, m)))
-    )
-    assert np.array_equal(answer.move.ravel()[held.at], held.value)
-    assert answer.force - answer.reaction == pytest.approx(force, abs=1e-13) or m == 4
-    free = np.setdiff1d(np.arange(n * m), held.at)
-    assert answer.force.ravel()[free] == pytest.approx(force.ravel()[free], abs=1e-12)
-    assert answer.force.ravel()[held.at] == pytest.approx((force + answer.reaction).ravel()[held.at], abs=1e-12)
+    response = rft.ResistiveForce(drag, where).response(np.zeros((n, 3)), e3, 0.0, tau)
+    answer = response.forced(force, held, np.zeros((n, m)))
+    z = np.zeros((m, m))
+    z[:3, :3] = drag.perp[0] * np.eye(3) + (drag.par[0] - drag.perp[0]) * np.outer(e3[0], e3[0])
+    z[3:, 3:] = drag.spin[0]
+    assert np.array_equal(answer.move[0], held.value)
+    assert answer.force[0] == pytest.approx(z @ held.value / tau, rel=1e-13)
+    assert answer.force - answer.reaction == pytest.approx(force, abs=1e-13)
+    assert np.all(answer.reaction[1:] == 0.0)
 
 
 # Symmetries

@@ -180,10 +180,7 @@ PLAIN |= {
     "step": lambda x: float(x >= 0),
 }
 CAREFUL = {
-    **{
-        name: _smooth(getattr(math, name))
-        for name in ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "exp")
-    },
+    **{name: _smooth(getattr(math, name)) for name in ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "exp")},
     "asin": _smooth(math.asin, -1, 1),
     "acos": _smooth(math.acos, -1, 1),
     "log": _smooth(math.log, 1e-300),
@@ -224,9 +221,7 @@ def test_value_is_pythons_to_the_bit(tree, s, t):
 
 @settings(max_examples=400, deadline=None)
 @given(trees, st.lists(st.floats(-3, 3), min_size=1, max_size=3), st.floats(0, 2))
-@example(
-    ("where(s<0, sqrt(-s), min(s, t, k)**2)", "(sqrt(-s) if s < 0 else min(s, t, k)**2)"), [-2.0, 0.3], 0.7
-)
+@example(("where(s<0, sqrt(-s), min(s, t, k)**2)", "(sqrt(-s) if s < 0 else min(s, t, k)**2)"), [-2.0, 0.3], 0.7)
 @example(("-s**2", "-s**2"), [1.5], 0.0)
 @example(("2/s - s/3/k", "2/s - s/3/k"), [1.5], 0.0)
 @example(("step(s) + 10*sign(t - 1)", "step(s) + 10*sign(t - 1)"), [-1.5, 2.0], 0.5)
@@ -516,9 +511,7 @@ def test_refused_at_once_with_a_reason(text):
     assert 0 < len(str(caught.value)) < 300
 
 
-@pytest.mark.parametrize(
-    "value", [True, False, None, [1], {"a": 1}, (1,), 1j, b"1", math.inf, math.nan, 10**400]
-)
+@pytest.mark.parametrize("value", [True, False, None, [1], {"a": 1}, (1,), 1j, b"1", math.inf, math.nan, 10**400])
 def test_values_that_are_neither_numbers_nor_texts_are_refused(value):
     with pytest.raises(ExpressionError):
         parse(value)
@@ -647,9 +640,7 @@ def test_a_call_costs_microseconds():
 
 
 def test_importing_and_parsing_needs_neither_numpy_nor_numexpr():
-    code = (
-        "import sys; from ibfil.expressions import parse; parse('2*s', ('s',)).at(s=1.0); print(*sys.modules)"
-    )
+    code = "import sys; from ibfil.expressions import parse; parse('2*s', ('s',)).at(s=1.0); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "ibfil.expressions" in done.stdout.split()
     assert not {"numpy", "numexpr", "pydantic"} & set(done.stdout.split())

@@ -42,14 +42,10 @@ def test_auto_takes_the_axis_for_relaxed_and_the_tangent_otherwise() -> None:
 
 def test_normal_is_where_e1_points_across_the_axis() -> None:
     normal = np.array([0.2, 1.0, -0.5])
-    filament = rod(
-        curvature=[3, 1], twist_rate=-2, shape={"kind": "relaxed"}, normal=normal.tolist(), **SPATIAL
-    )
+    filament = rod(curvature=[3, 1], twist_rate=-2, shape={"kind": "relaxed"}, normal=normal.tolist(), **SPATIAL)
     _, e1 = initial_shape(filament)
     across = e1[0] - (e1[0] @ X) * X
-    np.testing.assert_allclose(
-        across / np.linalg.norm(across), np.array([0, 1, -0.5]) / 1.25**0.5, atol=1e-14
-    )
+    np.testing.assert_allclose(across / np.linalg.norm(across), np.array([0, 1, -0.5]) / 1.25**0.5, atol=1e-14)
 
 
 def test_placing_neither_stretches_nor_mirrors() -> None:

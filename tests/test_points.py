@@ -39,9 +39,7 @@ def test_other_numbers_of_points_are_set_anew_along_the_curve(tmp_path: Path, he
     body = "\n".join(",".join(map(repr, row)) for row in points(200, power=1.3).tolist())
     path.write_text(heading + body)
     errors = []
-    exact, _ = initial_shape(
-        rod(shape={"kind": "helix", "curvature": 3.0, "torsion": 1.0}, align="chord", **SPATIAL)
-    )
+    exact, _ = initial_shape(rod(shape={"kind": "helix", "curvature": 3.0, "torsion": 1.0}, align="chord", **SPATIAL))
     r, _ = from_file(path, align="chord")
     for step in (1, 13, 40):
         distance = np.linalg.norm(exact[step:] - exact[:-step], axis=1)
@@ -111,9 +109,7 @@ def test_files_that_are_no_points_are_refused_in_one_line(tmp_path: Path) -> Non
 
     assert refused("none.csv", None) == "cannot be read (No such file or directory)"
     assert refused("a.txt", "0,0,0") == "must end in .csv or .npy"
-    assert refused("a.csv", "0,0,0\n1,0,zero\n").startswith(
-        "line 2 is not numbers divided by commas: '1,0,zero'"
-    )
+    assert refused("a.csv", "0,0,0\n1,0,zero\n").startswith("line 2 is not numbers divided by commas: '1,0,zero'")
     assert refused("a.csv", "y,x,z\n0,0,0\n").startswith("line 1 is not numbers")
     assert refused("a.csv", "0,0,0\n1,0\n") == "line 2 has 2 columns where the first row has 3"
     assert refused("a.csv", "0,0\n1,0\n").startswith("holds 2 x 2 numbers; each row must be x, y, z")

@@ -1,82 +1,22 @@
-"""The run loop: outputs, stop rules, Ctrl-C, kill -9, torn files, and going on bit for bit."""
+"""The run loop: outputs at their times, stop rules, failures."""
 
 from __future__ import annotations
 
 import errno
 import os
-import random
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from fake_simulation import ALWAYS, FakeSimulation, case
+from runs import HERE, content, go_on, interrupted, run
+
 from ibfil import checkpoint, recorder, running
-from ibfil.errors import CaseError, Interrupted, RunFailed
-from ibfil.record import RunFile, RunFileError, checkpoint_path, journal_path
+from ibfil.errors import CaseError, RunFailed
+from ibfil.record import RunFile, checkpoint_path
 from ibfil.schedule import due_times
-
-HERE = Path(__file__).parent
-# What going on bit for bit is tested with: (case, how its simulation is made, steps at which it is cut).
-SCENES = {
-    "fake": (lambda: case(), FakeSimulation, (1, 17, 18, 200, 339)),
-    "fake with fields": (lambda: case(grid=True), FakeSimulation, (1, 33, 34, 35, 299)),
-}
-
-
-def quiet(line: str) -> None:
-    """Say nothing."""
-
-
-def run(given, path=None, build=FakeSimulation, **more):
-    return running.run(given, path, build=build, progress=False, log=quiet, **more)
-
-
-def go_on(path, *given, build=FakeSimulation, log=quiet, **more):
-    return running.resume_run(path, *given, build=build, progress=False, log=log, **more)
-
-
-def signalling(build, step: int, number: int = signal.SIGINT):
-    """Makes simulations that send this process a signal after a step."""
-
-    def make(*given):
-        simulation = build(*given)
-        inner = simulation.advance
-
-        def advance(until, after_step):
-            def counted():
-                if simulation.steps == step:
-                    os.kill(os.getpid(), number)
-                after_step()
-
-            inner(until, counted)
-
-        simulation.advance = advance
-        return simulation
-
-    return make
-
-
-def content(path: Path) -> dict[str, tuple]:
-    """Every dataset of a run file: shape, type and bytes."""
-    found = {}
-
-    def take(name, item):
-        if isinstance(item, h5py.Dataset):
-            found[name] = (item.shape, item.dtype, item[()].tobytes())
-
-    with h5py.File(path, locking=False) as file:
-        file.visititems(take)
-    return found
-
-
-def interrupted(path: Path, step: int, given=None, build=FakeSimulation) -> None:
-    with pytest.raises(Interrupted):
-        run(given or case(), path, build=signalling(build, step))
 
 
 @pytest.fixture
@@ -92,7 +32,7 @@ def uncut(tmp_path_factory) -> Path:
     return path
 
 
-# --- outputs --------------------------------------------------------------------------------------------------------
+# --- outputs ---------------------------------------------------------------------------------------------------------
 
 
 def test_outputs_are_at_their_exact_times(path):
@@ -195,313 +135,7 @@ def test_observables_made_in_python_are_recorded(path):
     assert result.summaries["height"].value == result.series("height").mean()
 
 
-# --- Ctrl-C, and going on -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_cut_and_gone_on_with_is_as_never_cut(tmp_path, scene):
-    given, build, steps = SCENES[scene]
-    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
-    expected = run(given(), whole, build=build)
-    interrupted(path, steps[0], given(), build)
-    for step in steps[1:]:
-        with RunFile(path) as file:
-            assert file.status == "interrupted"
-        with pytest.raises(Interrupted):
-            go_on(path, build=signalling(build, step))
-    result = go_on(path, build=build)
-    assert content(path) == content(whole)
-    assert (result.status, result.steps) == ("finished", expected.steps)
-    for name, summary in expected.summaries.items():
-        assert np.array_equal(result.summaries[name].value, summary.value)
-    assert not checkpoint_path(path).exists()
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_run_between_two_steps_and_says_how_to_go_on(path, number):
-    before = signal.getsignal(number)
-    with pytest.raises(Interrupted, match=r"interrupted at t = 0\.3; go on with: ibfil run --resume .*run\.h5"):
-        run(case(), path, build=signalling(FakeSimulation, 102, number))
-    assert signal.getsignal(number) is before
-    assert checkpoint.read(checkpoint_path(path)).steps == 102
-    with RunFile(path) as file:
-        assert (file.status, len(file)) == ("interrupted", 6)  # the output at t = 0.3 was not taken yet
-
-
-def test_an_interrupted_run_without_a_file_says_so():
-    with pytest.raises(Interrupted, match="nothing was written"):
-        run(case(), build=signalling(FakeSimulation, 3))
-
-
-def test_a_second_ctrl_c_kills(path):
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; from fake_simulation import *; from ibfil import running\n"
-        "build = lambda *given: FakeSimulation(*given, pause=60)\n"
-        "running.run(case(), sys.argv[1], build=build, progress=False)"
-    )
-    victim = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent])
-    try:
-        wait_for(checkpoint_path(path).exists)
-        victim.send_signal(signal.SIGINT)
-        with pytest.raises(subprocess.TimeoutExpired):  # a step is taken to its end
-            victim.wait(0.5)
-        victim.send_signal(signal.SIGINT)
-        assert victim.wait(10) == -signal.SIGINT
-    finally:
-        victim.kill()
-        victim.wait()
-
-
-def wait_for(condition, seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
-
-
-def test_run_with_resume_begins_or_goes_on(path, uncut):
-    with pytest.raises(Interrupted):
-        run(case(), path, build=signalling(FakeSimulation, 100), resume=True)
-    result = run(case(), path, resume=True)
-    assert result.steps == 340
-    assert content(path) == content(uncut)
-
-
-def test_wall_time_and_steps_add_up(path):
-    interrupted(path, 100)
-    with RunFile(path) as file:
-        spent = file.wall_time
-    assert spent > 0
-    assert go_on(path).wall_time > spent
-
-
-# --- what may differ ------------------------------------------------------------------------------------------------
-
-
-def test_a_longer_end_goes_on_as_if_it_had_been_asked_for_first(path, tmp_path):
-    longer = tmp_path / "longer.h5"
-    run(case("", "time.end=1.5"), longer)
-    interrupted(path, 100)
-    go_on(path, None, ["time.end=1.5"])
-    assert content(path) == content(longer)
-    with RunFile(path) as file:
-        assert file.case.time.end == 1.5
-
-
-def test_other_outputs_from_here_on(path):
-    interrupted(path, 100)  # t = 0.295
-    go_on(path, None, ["output.every=0.1"])
-    with RunFile(path) as file:
-        assert np.allclose(file.time, [0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
-
-
-def test_another_scene_is_refused_with_its_keys(path):
-    interrupted(path, 100)
-    before = path.read_bytes(), checkpoint_path(path).read_bytes()
-    with pytest.raises(CaseError) as caught:
-        go_on(path, None, ["fluid.viscosity=2", "time.step=0.004", "time.end=3", "filament.rod.length=2"])
-    told = "\n".join(caught.value.faults)
-    assert len(caught.value.faults) == 3
-    assert all(key in told for key in ("fluid.viscosity", "time.step", "filament.rod.length"))
-    with pytest.raises(CaseError, match=r"fluid\.viscosity"):
-        go_on(path, case("", "fluid.viscosity=2"))
-    with pytest.raises(CaseError, match=r"time\.end: found 0\.1; allowed: at least 0\.295"):
-        go_on(path, None, ["time.end=0.1"])
-    assert (path.read_bytes(), checkpoint_path(path).read_bytes()) == before
-
-
-def test_nothing_to_go_on_from_is_one_line(path, tmp_path):
-    with pytest.raises(RunFileError, match=r"no checkpoint run\.ckpt\.h5"):
-        go_on(path)
-    run(case(), path)
-    with pytest.raises(RunFileError, match="its run is finished"):
-        go_on(path)
-    other = tmp_path / "other.h5"
-    interrupted(other, 50)
-    time.sleep(0.002)  # runs are told apart by the millisecond they began in
-    checkpoint_path(other).rename(checkpoint_path(path))
-    with pytest.raises(CaseError, match="belongs to another run"):
-        go_on(path)
-
-
-def test_a_run_that_is_running_is_not_gone_on_with(path):
-    shared = {}
-
-    class Asking(FakeSimulation):
-        def advance(self, until, after_step):
-            if not shared:
-                for attempt in (lambda: go_on(path), lambda: run(case(), path, overwrite=True)):
-                    with pytest.raises(RunFileError, match="is being written by another ibfil"):
-                        attempt()
-                shared["asked"] = True
-            super().advance(until, after_step)
-
-    run(case(), path, build=Asking)
-    assert shared
-
-
-# --- kill -9, and torn files ----------------------------------------------------------------------------------------
-
-
-def killed_over_and_over(path: Path, kills: int, seed: int) -> int:
-    """Run the fake case in processes that are killed after a random while, until one comes to its end; the kills."""
-    what, done, rng = "start", 0, random.Random(seed)
-    while True:
-        victim = subprocess.Popen(
-            [sys.executable, HERE / "fake_simulation.py", path, what],
-            env=os.environ | {"PYTHONPATH": f"{HERE}{os.pathsep}{HERE.parent}"},
-            stdout=subprocess.DEVNULL,
-        )
-        if done < kills:
-            wait_for(lambda: journal_path(path).exists() or victim.poll() is not None)  # it has got to writing
-            time.sleep(rng.uniform(0.0, 0.25))
-            victim.kill()
-            if victim.wait() == -signal.SIGKILL:
-                done += 1
-            what = "resume" if checkpoint_path(path).exists() else "start"
-            if what == "start" and path.exists():
-                path.unlink()
-        elif victim.wait(60) == 0:
-            return done
-
-
-def test_killed_at_any_moment_it_goes_on_from_its_checkpoint(path, uncut):
-    assert killed_over_and_over(path, 5, seed=1) == 5
-    assert content(path) == content(uncut)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2, 8))
-def test_killed_many_times_over(path, uncut, seed):
-    killed_over_and_over(path, 25, seed)
-    assert content(path) == content(uncut)
-
-
-def dies_in_call(dies_at: int, work) -> bool:
-    """Do the work in a forked process that is gone at its ``dies_at``-th call that writes or syncs; whether it was."""
-    child = os.fork()
-    if child:
-        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
-    try:
-        count = 0
-
-        def mortal(call):
-            def called(*args):
-                nonlocal count
-                count += 1
-                if count == dies_at:
-                    os._exit(9)
-                return call(*args)
-
-            return called
-
-        for name in ("pwrite", "ftruncate", "fsync", "replace"):
-            setattr(os, name, mortal(getattr(os, name)))
-        recorder._PAUSE = recorder._SHARE = 0
-        work()
-        os._exit(0)
-    finally:
-        os._exit(1)
-
-
-def test_nothing_before_the_checkpoint_is_lost_by_death_within_a_write(path, uncut):
-    """Death at one system call after another, from the first checkpoint on."""
-    deaths, torn = 0, 0
-    short = case("", "time.end=0.1", ALWAYS)
-    for dies_at in range(100, 3000, 61):
-        if not dies_in_call(dies_at, lambda: run(short, path, overwrite=True)):
-            break
-        if not checkpoint_path(path).exists():
-            continue
-        deaths += 1
-        said = []
-        torn += journal_path(path).stat().st_size > 0
-        with RunFile(path) as file:
-            assert len(file) >= checkpoint.read(checkpoint_path(path)).outputs
-        go_on(path, log=said.append)
-        assert not any("rebuilt" in line for line in said)
-        with RunFile(path) as file, RunFile(uncut) as whole:
-            assert np.array_equal(file.position(), whole.position()[:3])
-    assert deaths > 5
-    assert torn > 1
-
-
-@pytest.mark.parametrize("damage", ["half", "end", "middle", "empty", "text", "gone", "older"])
-def test_a_damaged_file_is_rebuilt_and_it_says_so(path, uncut, damage):
-    older = path.with_name("older")
-    interrupted(path, 60)
-    older.write_bytes(path.read_bytes())
-    with pytest.raises(Interrupted):
-        go_on(path, build=signalling(FakeSimulation, 200))
-    data = bytearray(path.read_bytes())
-    if damage == "half":
-        path.write_bytes(data[: len(data) // 2])
-    elif damage == "end":
-        path.write_bytes(data[:-1000])
-    elif damage == "middle":
-        data[300:30_000] = bytes(29_700)
-        path.write_bytes(data)
-    elif damage in ("empty", "text"):
-        path.write_bytes(b"" if damage == "empty" else b"not a run file\n")
-    elif damage == "gone":
-        path.unlink()
-    else:
-        path.write_bytes(older.read_bytes())
-    said = []
-    result = go_on(path, log=said.append)
-    assert any("rebuilt by computing it again" in line for line in said)
-    assert result.status == "finished"
-    assert content(path) == content(uncut)
-
-
-def test_outputs_after_the_checkpoint_are_cut_and_made_again(path, uncut):
-    interrupted(path, 100)
-    kept = checkpoint_path(path).read_bytes()
-    with pytest.raises(Interrupted):
-        go_on(path, build=signalling(FakeSimulation, 300))
-    with RunFile(path) as file:
-        assert len(file) == 18
-    checkpoint_path(path).write_bytes(kept)  # as if killed before the next one
-    said = []
-    go_on(path, log=said.append)
-    assert any("from t = 0.295, after 6 outputs" in line for line in said)
-    assert content(path) == content(uncut)
-
-
-def test_the_file_can_be_read_while_it_is_written(path, uncut):
-    """By h5py in another process than the writer, at any time, the outputs so far whole and right."""
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; from fake_simulation import *; from ibfil import recorder, running\n"
-        "recorder._PAUSE = recorder._SHARE = 0\n"
-        "build = lambda *given: FakeSimulation(*given, pause=0.003)\n"
-        "running.run(case('', 'output.checkpoint_every=1000'), sys.argv[1], build=build, progress=False)"
-    )
-    with h5py.File(uncut) as file:
-        expected = file["filaments/rod/position"][()]
-    writer = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent], stdout=subprocess.DEVNULL)
-    lengths, failures = [], 0
-    try:
-        wait_for(checkpoint_path(path).exists)
-        while writer.poll() is None:
-            with RunFile(path) as file:
-                status, position = file.status, file.position()
-            assert status in ("running", "finished")
-            assert np.array_equal(position, expected[: len(position)])
-            lengths.append(len(position))
-            try:
-                with h5py.File(path, "r", locking=False) as plain:
-                    assert np.array_equal(plain["filaments/rod/e1"][0], 4 * expected[0])
-            except OSError:
-                failures += 1  # h5py alone may come in the midst of a write
-    finally:
-        writer.kill()
-        writer.wait()
-    assert len(set(lengths)) > 5
-    assert lengths == sorted(lengths)
-    assert failures < 0.05 * len(lengths) + 1
-
-
-# --- failures -------------------------------------------------------------------------------------------------------
+# --- failures --------------------------------------------------------------------------------------------------------
 
 
 def test_a_failed_run_says_what_and_leaves_what_was_written(path, uncut):
@@ -587,7 +221,7 @@ def test_bad_input_writes_nothing(path):
     assert path.read_text() == "something of the user's"
 
 
-# --- stop rules -----------------------------------------------------------------------------------------------------
+# --- stop rules ------------------------------------------------------------------------------------------------------
 
 
 class Gliding(FakeSimulation):

@@ -43,18 +43,14 @@ def test_spacing_must_rise_from_nought_to_one(text: str, part: str) -> None:
 
 
 def test_straight_rod_lies_along_direction_with_e1_along_normal() -> None:
-    r, e1 = initial_shape(
-        rod(nodes=21, position=[1.0, 2.0, 3.0], direction=[0.0, 2.0, 0.0], normal=[0, 1, 4])
-    )
+    r, e1 = initial_shape(rod(nodes=21, position=[1.0, 2.0, 3.0], direction=[0.0, 2.0, 0.0], normal=[0, 1, 4]))
     np.testing.assert_allclose(r - [1.0, 2.0, 3.0], np.outer(np.linspace(-0.5, 0.5, 21), Y), atol=5e-16)
     assert np.all(e1 == Z)
 
 
 def test_swimmer_is_the_integral_of_its_angle() -> None:
     # Sec. 7.1 at t = 0: theta' = 8 sin(4 pi s), whose mean tangent lies along x with theta as here.
-    filament = rod(
-        curvature=["8*sin(4*pi*s - 10*t)", 0], shape={"kind": "relaxed"}, anchor="centroid", align="axis"
-    )
+    filament = rod(curvature=["8*sin(4*pi*s - 10*t)", 0], shape={"kind": "relaxed"}, anchor="centroid", align="axis")
     r, e1 = initial_shape(filament)
     s = node_arclength(filament)
 
@@ -161,15 +157,11 @@ def test_varying_strains_agree_with_the_frame_equations_integrated_another_way()
 
 
 def test_a_jump_in_curvature_joins_two_arcs() -> None:
-    filament = rod(
-        curvature=["step(s - 1/3)*pi", 0], shape={"kind": "relaxed"}, align="tangent", anchor="start"
-    )
+    filament = rod(curvature=["step(s - 1/3)*pi", 0], shape={"kind": "relaxed"}, align="tangent", anchor="start")
     r, _ = initial_shape(filament)
     s = node_arclength(filament)
     angle = np.pi * np.maximum(s - 1.0 / 3.0, 0.0)
-    exact = np.stack(
-        (np.minimum(s, 1.0 / 3.0) + np.sin(angle) / np.pi, (1.0 - np.cos(angle)) / np.pi), axis=1
-    )
+    exact = np.stack((np.minimum(s, 1.0 / 3.0) + np.sin(angle) / np.pi, (1.0 - np.cos(angle)) / np.pi), axis=1)
     # The jump falls inside one of at least 32768 pieces, so the angle is off by no more than pi/32768.
     np.testing.assert_allclose(r[:, :2], exact, atol=np.pi / 32768)
 
@@ -232,10 +224,7 @@ def test_end_tangents_are_those_of_the_perturbed_curve() -> None:
 def noisy(seed: int = 1, **keys: Any) -> np.ndarray:
     noise = {"amplitude": 1e-3, "modes": 6, "seed": seed}
     shape = keys.pop("shape", {"kind": "straight"})
-    return (
-        initial_shape(rod(shape=shape | {"noise": noise}, **keys))[0]
-        - initial_shape(rod(shape=shape, **keys))[0]
-    )
+    return initial_shape(rod(shape=shape | {"noise": noise}, **keys))[0] - initial_shape(rod(shape=shape, **keys))[0]
 
 
 def test_noise_is_the_same_curve_for_a_seed_at_any_number_of_nodes() -> None:

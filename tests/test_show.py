@@ -105,7 +105,14 @@ def test_durations(seconds, words):
 def test_figure_shows_all_there_is(run):
     fig = figure.figure(run)
     titles = " | ".join(axes.get_title(loc="left") for axes in fig.axes)
-    for part in ("Shapes", "Centroid", "Flow at z", "tip (um)", "speed (um)", "power on the fluid (pN um/s)"):
+    for part in (
+        "Shapes",
+        "Centroid",
+        "Flow at z",
+        "tip: position (um)",
+        "speed: position (um)",
+        "power on the fluid (pN um/s)",
+    ):
         assert part in titles
     shapes = fig.axes[0]
     assert (shapes.get_xlabel(), shapes.get_ylabel()) == ("x (um)", "y (um)")

@@ -1,0 +1,71 @@
+"""What a step costs, from counts alone: so that the same case always takes the same method, on any machine.
+
+The constants are of one thread of a machine of 2025; only their ratios decide anything.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .case_schema import Case
+
+_NODE = 2.0e-6  # seconds a node for geometry, force, stiffness and a banded solve
+_SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
+_PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
+_FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
+_MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
+_ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
+_PRODUCTS = 6  # of GMRES with a kept preconditioner, an iteration of Newton
+_LARGEST = 2.0**30  # bytes that the table's dense matrices may take before the table is out of the question
+
+
+def full_evaluation(cells: Sequence[int]) -> float:
+    """Seconds of one velocity evaluation by whole FFTs: three passes forth and back of three components."""
+    return 6 * float(np.prod(cells)) * float(np.log2(np.prod(cells))) * _MODE / 3
+
+
+def pruned_evaluation(cells: Sequence[int], sizes: Sequence[int]) -> float:
+    """The same by the lines of a box of ``sizes`` (3,) cells."""
+    from .pruned import is_thin
+
+    (ec, nc), (eb, nb), (_, na) = sorted(zip(sizes, cells, strict=True))
+    lines = ec * eb * na * np.log2(na) + ec * nb * na * np.log2(nb)
+    if is_thin(ec, nc):
+        return 6 * float(lines) * _MODE + 18.0 * ec * ec * nb * na * _FLOP
+    return 6 * float(lines + nc * nb * na * np.log2(nc)) * _MODE
+
+
+def seconds_a_step(
+    case: Case, nodes: int, cells: Sequence[int] | None = None, sizes: Sequence[int] | None = None
+) -> dict[str, float]:
+    """Seconds of one step by each method: "rft", or on ``cells`` (3,) "table", "fft", "pruned" and "krylov".
+
+    ``sizes`` (3,) are the extents of the filaments' bounding box in cells. The table is out where it does not fit.
+    """
+    rounds = _ROUNDS[case.time.scheme]
+    local = rounds * nodes * _NODE
+    if cells is None or sizes is None:
+        return {"rft": local}
+    build = 0.5 * nodes**2 * _PAIR
+    full = full_evaluation(cells) + nodes * _SPREAD
+    pruned = pruned_evaluation(cells, sizes) + nodes * _SPREAD
+    if case.time.scheme == "explicit":
+        return {"table": local + build, "fft": local + full, "pruned": local + pruned}
+    exact = build + rounds * 4.0 * (3.0 * nodes) ** 3 * _FLOP
+    fits = dense_bytes(nodes) < _LARGEST
+    return {
+        "table": local + exact if fits else np.inf,
+        "fft": local + exact + 4 * rounds * full if fits else np.inf,
+        "pruned": local + exact + 4 * rounds * pruned if fits else np.inf,
+        "krylov": local + (2 + _PRODUCTS) * rounds * min(full, pruned),
+    }
+
+
+def dense_bytes(nodes: int) -> float:
+    """Bytes of the dense matrices of the table and its solve."""
+    return 4 * 8.0 * (3.0 * nodes) ** 2

@@ -1,0 +1,42 @@
+"""The benchmark's pieces run and give numbers; how fast they are is never tested."""
+
+import json
+import math
+
+import pytest
+
+from ibfil import bench
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        lambda: [bench.rft_step(16)],
+        lambda: bench.evaluations(16, (1.1, 0.5)),
+        lambda: [bench.table_pair("roma3", 1.0, 5)],
+        lambda: bench.swimmers(end=1e-3),
+    ],
+)
+def test_pieces_give_finite_positive_numbers(rows, monkeypatch):
+    monkeypatch.setattr(bench, "_TURNS", 2)
+    for row in rows():
+        assert math.isfinite(row.ratio)
+        assert min(row.seconds, row.floor_seconds, row.ratio) > 0
+        assert row.verdict in ("", "ok", "over")
+        assert row.piece in bench.table([row])
+
+
+def test_the_verdict_follows_the_bar():
+    assert bench.Row("a", 2.0, "b", 1.0, 2.0, 1.9).verdict == "over"
+    assert bench.Row("a", 2.0, "b", 1.0, 2.0, 2.1).verdict == "ok"
+    assert bench.Row("a", 2.0, "b", 1.0, 2.0, None).verdict == ""
+
+
+def test_json_is_json(monkeypatch, capsys):
+    row = bench.Row("a", 2.0, "b", 1.0, 2.0, None)
+    for name in ("rft_step", "table_pair", "start_up"):
+        monkeypatch.setattr(bench, name, lambda *a: row)
+    monkeypatch.setattr(bench, "evaluations", lambda *a: [row])
+    monkeypatch.setattr(bench, "swimmers", lambda: [row])
+    assert bench.main(json=True) == 0
+    assert json.loads(capsys.readouterr().out)[0]["ratio"] == 2.0

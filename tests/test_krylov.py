@@ -1,0 +1,138 @@
+"""Many nodes: Krylov on the FFT operator against the dense path, its residual, its memory; copies of a filament."""
+
+import numpy as np
+import pytest
+
+from ibfil.case import parse_case
+from ibfil.errors import CaseError
+from ibfil.report import memory
+from ibfil.simulation import Simulation
+
+MANY = """
+[filament.rod]
+length = 0.5
+nodes = {nodes}
+bending = [1, 0.6]
+{twisting}
+stretching = 1e3
+curvature = ["6*sin(4*pi*s - 10*t)", 0]
+shape = {{ kind = "relaxed" }}
+copies = {{ count = {count}, seed = 5, region = [[-0.8, -0.8, -0.8], [0.8, 0.8, 0.8]] }}
+{start}
+[fluid]
+model = "stokes"
+viscosity = 1.3
+box = [3.2, 3.2, 3.2]
+cells = [32, 32, 32]
+method = "{method}"
+[time]
+end = 0.06
+step = 0.01
+[output]
+every = 0.06
+"""
+TWIST = "twisting = 0.7\nradius = 0.02"
+CLAMP = 'start = { end = "clamped", spin = 3.0 }'
+
+
+def _simulation(method, count=3, nodes=12, twisting="", start=""):
+    return Simulation(
+        parse_case(MANY.format(method=method, count=count, nodes=nodes, twisting=twisting, start=start), "many.toml")
+    )
+
+
+def _run(simulation):
+    simulation.advance(0.06, lambda: None)
+    return simulation.frame()
+
+
+@pytest.mark.parametrize(("twisting", "start"), [("", ""), (TWIST, ""), (TWIST, CLAMP)])
+def test_krylov_is_the_dense_path_on_three_filaments(twisting, start):
+    dense = _run(_simulation("table", twisting=twisting, start=start))
+    krylov = _run(_simulation("krylov", twisting=twisting, start=start))
+    assert list(dense.filaments) == ["rod_000", "rod_001", "rod_002"]
+    for name, one in dense.filaments.items():
+        other = krylov.filaments[name]
+        assert np.abs(one.position - other.position).max() < 6 * 1e-8 * 0.5  # six steps, each to Newton's tolerance
+        assert np.abs(one.e1 - other.e1).max() < 1e-7
+        assert np.abs(one.force - other.force).max() < 1e-5 * np.abs(one.force).max()
+        if start:
+            size = np.linalg.norm(one.reaction_start)
+            assert np.linalg.norm(one.reaction_start - other.reaction_start) < 1e-5 * size
+
+
+def test_residual_of_a_step_with_2000_nodes():
+    """y = target + tau M F at every node, with the velocity of the FFT operator."""
+    simulation = _simulation("krylov", 40, 50)
+    start = simulation.shape.r.copy()
+    simulation.advance(0.01, lambda: None)  # one step of Euler, M frozen at the start
+    move = simulation.shape.r - start
+    force = simulation.state()["force"]
+    fluid = simulation.fluid
+    base, weights = fluid.fluid.stencil(start)
+    u = fluid.solver.velocity(base, weights, np.ascontiguousarray(force)) + fluid.fluid.slip[:, None] * force
+    assert np.abs(move - 0.01 * u).max() < 1e-6 * np.abs(move).max()
+
+
+def test_the_kept_preconditioner_goes_into_the_state_and_comes_back():
+    whole, cut = _simulation("krylov", twisting=TWIST), _simulation("krylov", twisting=TWIST)
+    cut.advance(0.03, lambda: None)
+    again = _simulation("krylov", twisting=TWIST)
+    again.restore(cut.state())
+    whole.advance(0.03, lambda: None)
+    for simulation in (whole, again):
+        simulation.advance(0.06, lambda: None)
+    assert np.array_equal(whole.shape.r, again.shape.r)
+    assert np.array_equal(whole.shape.e1, again.shape.e1)
+
+
+def test_memory_of_ten_thousand_nodes_is_told_and_below_two_gibibytes():
+    """200 x 50 and 20 x 500 at 128^3, from counts; nothing is run."""
+    for count, nodes in ((200, 50), (20, 500)):
+        simulation = _simulation("krylov", count, nodes)
+        simulation.grid.cells = np.array([128, 128, 128])
+        assert sum(memory(simulation).values()) < 2 * 2**30
+
+
+def test_auto_takes_krylov_where_the_table_costs_more():
+    assert _simulation("auto", 2, 12).method == "table"
+    assert _simulation("auto", 60, 20).method == "krylov"
+
+
+def test_copies_are_the_same_filament_turned_and_moved():
+    simulation = _simulation("table", 4)
+    frame = simulation.frame()
+    one = frame.filaments["rod_000"].position
+    distances = np.linalg.norm(one[:, None] - one[None], axis=2)
+    for filament in frame.filaments.values():
+        r = filament.position
+        assert np.allclose(np.linalg.norm(r[:, None] - r[None], axis=2), distances, atol=1e-13)
+        middle = r[np.array([5, 6])].mean(axis=0)
+        assert np.all(np.abs(middle) < 0.9)
+    turns = [np.linalg.norm(f.position[-1] - f.position[0] - (one[-1] - one[0])) for f in frame.filaments.values()]
+    assert min(turns[1:]) > 0.05  # turned, each its own way
+    again = _simulation("table", 4).frame()
+    assert np.array_equal(again.filaments["rod_003"].position, frame.filaments["rod_003"].position)
+
+
+def test_copies_from_a_file(tmp_path):
+    (tmp_path / "places.csv").write_text("0.5, 0, 0, 0, 0, 0, 1\n-0.5, 0.25, 0, 0, 0, 1, 0\n")
+    text = MANY.format(method="table", count=1, nodes=12, twisting="", start="")
+    text = text.replace(text.split("copies = ")[1].split("\n")[0], '{ file = "places.csv" }')
+    case = parse_case(text, str(tmp_path / "many.toml"))
+    a, b = (f.position for f in Simulation(case).frame().filaments.values())
+    assert np.allclose((a - [0.5, 0, 0]) * [-1, -1, 1], b - [-0.5, 0.25, 0], atol=1e-14)  # half a turn about z
+    (tmp_path / "places.csv").write_text("1, 2\n")
+    with pytest.raises(CaseError, match=r"copies\.file"):
+        Simulation(case)
+
+
+def test_thickness_chooses_the_grid():
+    text = MANY.format(method="table", count=1, nodes=12, twisting="", start="")
+    got = Simulation(parse_case(text.replace("cells = [32, 32, 32]", "thickness = 0.1105"), "t.toml"))
+    assert got.grid.cells.tolist() == [32, 32, 32]
+    got = Simulation(parse_case(text.replace("cells = [32, 32, 32]", "thickness = 0.11"), "t.toml"))
+    assert got.grid.cells.tolist() == [36, 36, 36]
+    odd = text.replace("cells = [32, 32, 32]", "thickness = 0.1105").replace("3.2, 3.2, 3.2", "3.2, 3.2, 3.7")
+    with pytest.raises(CaseError, match=r"fluid\.thickness.*box = "):
+        Simulation(parse_case(odd, "t.toml"))

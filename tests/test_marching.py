@@ -1,0 +1,157 @@
+"""Steps between outputs: equal ones, and those a tolerance chooses."""
+
+import numpy as np
+import pytest
+
+from ibfil.case import parse_case
+from ibfil.errors import RunFailed
+from ibfil.simulation import Simulation
+
+SWIMMER = """
+[filament.rod]
+length = 1.0
+nodes = 41
+bending = 1.0
+stretching = 1.6e4
+curvature = ["8*sin(4*pi*s - 10*t)", 0]
+shape = { kind = "relaxed" }
+"""
+WHIRLING = """
+[filament.rod]
+length = 1.0
+nodes = 25
+bending = 1.0
+twisting = 1.0
+stretching = 1.6e4
+radius = 0.1
+anchor = "start"
+normal = [0, 1, 0]
+shape = { kind = "straight", perturb = ["0", "0.1*s**2", "0.1*s**2*(1 - s/3)"] }
+start = { end = "clamped", spin = "10/(4*pi*0.01)" }
+"""
+FLAILING = """
+[parameters]
+k = 1.8751040687119611
+c = "(cos(k) + cosh(k))/(sin(k) - sinh(k))"
+[filament.rod]
+length = 1.0
+nodes = 25
+bending = 1.0
+stretching = 2e4
+anchor = "start"
+normal = [0, 1, 0]
+start = { end = "clamped" }
+finish = { follower = -60 }
+[filament.rod.shape]
+kind = "straight"
+perturb = ["0", "0", "0.02*(sin(k*s) - sinh(k*s) + c*(cos(k*s) - cosh(k*s)))"]
+"""
+REST = """
+[fluid]
+model = "rft"
+viscosity = 1.0
+[time]
+end = {end}
+{time}
+[output]
+every = {end}
+"""
+
+
+def _simulation(rod, end, time=""):
+    return Simulation(parse_case(rod + REST.format(end=end, time=time), "test.toml"))
+
+
+def _path(rod, end, time, outputs=4):
+    """Positions at equal times up to ``end``, and the simulation."""
+    simulation, out = _simulation(rod, end, time), []
+    for k in range(outputs):
+        simulation.advance(end * (k + 1) / outputs, lambda: None)
+        assert simulation.time == end * (k + 1) / outputs
+        out.append(simulation.shape.r.copy())
+    return np.array(out), simulation
+
+
+@pytest.mark.parametrize(
+    ("rod", "end", "tolerances"),
+    [
+        (SWIMMER, 0.6, (1e-2, 1e-3, 1e-4, 1e-5)),
+        (WHIRLING, 2.0, (1e-2, 1e-3, 1e-4, 1e-5)),
+        (FLAILING, 0.6, (1e-2, 1e-3, 1e-4)),
+        pytest.param(FLAILING, 2.0, (1e-2, 1e-3, 1e-4, 1e-5), marks=pytest.mark.slow),
+    ],
+)
+def test_the_error_is_the_tolerance_within_a_factor_of_three(rod, end, tolerances):
+    """rms node error over length and time, at its largest output, over the decades; against 0.1 of the least."""
+    reference, _ = _path(rod, end, f"tolerance = {0.1 * min(tolerances)}\nmin_step = 1e-13")
+    times = end * np.arange(1, 5) / 4
+    for tolerance in tolerances:
+        found, _ = _path(rod, end, f"tolerance = {tolerance}\nmin_step = 1e-13")
+        error = np.sqrt(np.mean(np.sum((found - reference) ** 2, axis=2), axis=1))
+        ratio = float(np.max(error / times)) / tolerance
+        assert 1 / 3 < ratio < 3, f"tolerance {tolerance:g}: {ratio:.2g} of it"
+
+
+def test_steps_follow_the_square_root_of_the_tolerance():
+    steps = [_path(SWIMMER, 0.6, f"tolerance = {tolerance}")[1].steps for tolerance in (1e-3, 1e-5)]
+    assert 7 < steps[1] / steps[0] < 13
+
+
+def test_a_jump_in_what_drives_the_rod_is_stepped_over_carefully():
+    rod = SWIMMER.replace("8*sin(4*pi*s - 10*t)", "8*sin(4*pi*s)*step(t - 0.1)").replace(
+        'kind = "relaxed"', 'kind = "straight"'
+    )
+    found, simulation = _path(rod, 0.2, "tolerance = 1e-3")
+    fine, _ = _path(rod, 0.2, "tolerance = 3e-5\nmin_step = 1e-14")
+    assert simulation.shortened >= 3
+    assert np.sqrt(np.mean(np.sum((found[-1] - fine[-1]) ** 2, axis=1))) < 3e-3 * 0.2
+
+
+@pytest.mark.parametrize("time", ["step = 0.007", "tolerance = 1e-3"])
+def test_outputs_are_hit_exactly_and_a_cut_run_goes_on_with_the_same_steps(time):
+    whole, cut = _simulation(SWIMMER, 0.1, time), _simulation(SWIMMER, 0.1, time)
+
+    class Cut(Exception):
+        pass
+
+    def after_five_steps():
+        if cut.steps == 5:
+            raise Cut
+
+    with pytest.raises(Cut):
+        cut.advance(0.05, after_five_steps)
+    again = _simulation(SWIMMER, 0.1, time)
+    again.restore(cut.state())
+    for goal in (0.05, 0.1):
+        whole.advance(goal, lambda: None)
+        again.advance(goal, lambda: None)
+        assert whole.time == again.time == goal
+        assert np.array_equal(whole.shape.r, again.shape.r)
+    assert whole.steps == again.steps
+
+
+def test_equal_steps_are_never_longer_than_asked():
+    simulation, times = _simulation(SWIMMER, 0.1, "step = 0.007"), [0.0]
+    simulation.advance(0.05, lambda: times.append(simulation.time))
+    lengths = np.diff(times)
+    assert len(lengths) == 8
+    assert np.allclose(lengths, 0.05 / 8, rtol=1e-12)
+
+
+def test_too_many_steps_are_a_clear_failure():
+    with pytest.raises(RunFailed, match="max_steps") as failure:
+        _simulation(SWIMMER, 0.1, "step = 1e-3\nmax_steps = 7").advance(0.1, lambda: None)
+    assert failure.value.time == pytest.approx(8e-3)
+    assert "max_steps" in failure.value.advice
+
+
+def test_a_step_that_cannot_be_solved_is_halved_and_told_and_given_up_at_the_floor():
+    """A straight rod that is told to coil up at once: Newton needs short steps at first."""
+    rod = SWIMMER.replace('"8*sin(4*pi*s - 10*t)"', "40").replace('kind = "relaxed"', 'kind = "straight"')
+    simulation = _simulation(rod, 0.2, "step = 0.2")
+    simulation.advance(0.2, lambda: None)
+    assert simulation.shortened > 0
+    assert simulation.frame().diagnostics["steps_shortened"] == simulation.shortened
+    with pytest.raises(RunFailed, match=r"dt = 0\.2") as failure:
+        _simulation(rod, 0.2, "step = 0.2\nmin_step = 0.15").advance(0.2, lambda: None)
+    assert failure.value.advice
