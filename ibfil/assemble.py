@@ -251,11 +251,16 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     grid, eta = Grid(case.fluid.box, case.fluid.cells or cells_of_thickness(case)), case.fluid.viscosity
     slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, eta, stacked.spacing)
     spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 else None
-    made = immersed.Immersed(grid, kernel(case), eta, slip, spin, flow(case), stacked.nodes)
+    number = np.float32 if case.fluid.precision == "single" else np.float64
+    made = immersed.Immersed(grid, kernel(case), eta, slip, spin, flow(case), stacked.nodes, number)
     seconds = method_seconds(case, stacked, grid)
-    method = case.fluid.method if case.fluid.method != "auto" else min(seconds, key=lambda name: seconds[name])
+    # The averaged table is an approximation: on request only.
+    exact = [name for name in seconds if name != "averaged"]
+    method = case.fluid.method if case.fluid.method != "auto" else min(exact, key=lambda name: seconds[name])
     if method == "table":
         return stokes.StokesByTable(made), method, grid
+    if method == "averaged":
+        return stokes.StokesByAverage(made), method, grid
     kind = stokes.StokesByKrylov if method == "krylov" else stokes.StokesByFFT
     whole = method == "fft" or (method == "krylov" and not fills_little(case, stacked, grid))
     solver = (stokes.StokesSolve if whole else PrunedSolve)(grid, eta, case.compute.threads)

@@ -14,10 +14,8 @@ import numpy as np
 from numba import njit
 from scipy.linalg import solve_banded
 
-from .blocks import invert, less, less_times, part, product, put, put_part, take, times
+from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
 from .rods import Mesh
-
-_SMALLEST = 1e-12  # a pivot inside a diagonal block, relative to the block's largest entry
 
 
 class Profile(NamedTuple):
@@ -84,7 +82,7 @@ def eliminate(matrix, x, first, last, unit):
     n, m, columns = matrix.shape
     w = (columns // m - 1) // 2
     blocks = matrix.reshape(n, m, columns // m, m).transpose(0, 2, 1, 3)
-    upper, factor, inverse = np.empty((n, w, m, m)), np.empty((1, w, m, m)), np.empty((n, 1, m, m))
+    upper, factor, diagonal = np.empty((n, w, m, m)), np.empty((1, w, m, m)), np.empty((n, 1, m, m))
     for i in range(n):
         low = first[i]
         for j in range(low, last[i] + 1):
@@ -93,12 +91,13 @@ def eliminate(matrix, x, first, last, unit):
                 if last[k] >= j:
                     s = less(s, take(factor, 0, k - low, unit), take(upper, k, j - k - 1, unit))
             if j < i:
-                put(factor, 0, j - low, product(s, take(inverse, j, 0, unit)))
+                put(factor, 0, j - low, product(s, take(diagonal, j, 0, unit)))
             elif j > i:
                 put(upper, i, j - i - 1, s)
             else:
-                put(inverse, i, 0, s)
-                if not invert(inverse, i, unit, _SMALLEST):
+                s, good = inverse(s)
+                put(diagonal, i, 0, s)
+                if not good:
                     return False
         y = part(x, i, unit)
         for k in range(low, i):
@@ -108,7 +107,7 @@ def eliminate(matrix, x, first, last, unit):
         y = part(x, i, unit)
         for j in range(i + 1, last[i] + 1):
             y = less_times(y, take(upper, i, j - i - 1, unit), part(x, j, unit))
-        put_part(x, i, times(take(inverse, i, 0, unit), y))
+        put_part(x, i, times(take(diagonal, i, 0, unit), y))
     return True
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from numba import njit
 
+_SMALLEST = 1e-12  # a pivot, relative to what it is among
+
 
 @njit(cache=True)
 def _row(a, i, j, r, unit):
@@ -121,26 +123,52 @@ def less(s, f, u):
     return _less_row(s[0], f[0], u), _less_row(s[1], f[1], u), _less_row(s[2], f[2], u), _less_row(s[3], f[3], u)
 
 
-@njit(cache=True, inline="always")
-def invert(a, i, unit, smallest):
-    """Inverts the block ``a[i, 0]`` (m, m) in place, by Gauss and Jordan without pivoting.
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _inverse2(a, b, c, d):
+    """The inverse of ((a, b), (c, d)), row by row, and whether its determinant is more than round-off."""
+    f, size = a * d - b * c, max(max(abs(a), abs(b)), max(abs(c), abs(d)))
+    return (d / f, -b / f, -c / f, a / f), abs(f) > _SMALLEST * size * size
 
-    False where a pivot is below ``smallest`` times the block's largest entry, or not a number.
-    """
-    m, size, good = len(unit), 0.0, True
-    for r in range(m):
-        for c in range(m):
-            size = max(size, abs(a[i, 0, r, c]))
-    for k in range(m):
-        good = good and abs(a[i, 0, k, k]) > smallest * size
-        f = 1.0 / a[i, 0, k, k]
-        a[i, 0, k, k] = 1.0
-        for c in range(m):
-            a[i, 0, k, c] *= f
-        for r in range(m):
-            if r != k:
-                f = a[i, 0, r, k]
-                a[i, 0, r, k] = 0.0
-                for c in range(m):
-                    a[i, 0, r, c] -= f * a[i, 0, k, c]
-    return good
+
+@njit(cache=True, fastmath={"contract"})
+def _product2(a, b):
+    return (
+        *(a[0] * b[0] + a[1] * b[2], a[0] * b[1] + a[1] * b[3]),
+        *(a[2] * b[0] + a[3] * b[2], a[2] * b[1] + a[3] * b[3]),
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _inverse3(s):
+    """By the Schur complement t of the first pivot."""
+    (a, b, c), (d, e, f), (g, h, i) = s
+    p = 1.0 / a
+    b, c, x, y = p * b, p * c, p * d, p * g
+    t, good = _inverse2(e - d * b, f - d * c, h - g * b, i - g * c)
+    u, v = b * t[0] + c * t[2], b * t[1] + c * t[3]
+    q, r = t[0] * x + t[1] * y, t[2] * x + t[3] * y
+    size = max(max(abs(d), abs(e)), max(abs(g), abs(i)))
+    good = good and abs(a) > _SMALLEST * size
+    return ((p + u * x + v * y, -u, -v), (-q, t[0], t[1]), (-r, t[2], t[3])), good
+
+
+@njit(cache=True, fastmath={"contract"})
+def _inverse4(s):
+    """By the Schur complement t of the first two pivots."""
+    (a, b, c, d), (e, f, g, h), (i, j, k, m), (o, p, q, r) = s
+    first, well = _inverse2(a, b, e, f)
+    x, y = _product2(first, (c, d, g, h)), _product2((i, j, o, p), first)
+    z = _product2(y, (c, d, g, h))
+    t, good = _inverse2(k - z[0], m - z[1], q - z[2], r - z[3])
+    u, v = _product2(x, t), _product2(t, y)
+    w = _product2(u, y)
+    top = (first[0] + w[0], first[1] + w[1], -u[0], -u[1]), (first[2] + w[2], first[3] + w[3], -u[2], -u[3])
+    return (*top, (-v[0], -v[1], t[0], t[1]), (-v[2], -v[3], t[2], t[3])), good and well
+
+
+@njit(cache=True)
+def inverse(s):
+    """The inverse of a block, its rows taken in their order; and whether no pivot on the way was nearly zero."""
+    if len(s) == 3:
+        return _inverse3(s)
+    return _inverse4(s)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _NODE = 2.0e-6  # seconds a node for geometry, force, stiffness and a banded solve
 _SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
 _PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
+_AVERAGED = 0.25  # a pair of the averaged table, of one of the exact
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
 _ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
@@ -43,7 +44,7 @@ def pruned_evaluation(cells: Sequence[int], sizes: Sequence[int]) -> float:
 def seconds_a_step(
     case: Case, nodes: int, cells: Sequence[int] | None = None, sizes: Sequence[int] | None = None
 ) -> dict[str, float]:
-    """Seconds of one step by each method: "rft", or on ``cells`` (3,) "table", "fft", "pruned" and "krylov".
+    """Seconds of one step by each method: "rft", or on ``cells`` (3,) "table", "averaged", "fft", "pruned", "krylov".
 
     ``sizes`` (3,) are the extents of the filaments' bounding box in cells. The table is out where it does not fit.
     """
@@ -55,11 +56,13 @@ def seconds_a_step(
     full = full_evaluation(cells) + nodes * _SPREAD
     pruned = pruned_evaluation(cells, sizes) + nodes * _SPREAD
     if case.time.scheme == "explicit":
-        return {"table": local + build, "fft": local + full, "pruned": local + pruned}
+        averaged = local + build * _AVERAGED
+        return {"table": local + build, "averaged": averaged, "fft": local + full, "pruned": local + pruned}
     exact = build + rounds * 4.0 * (3.0 * nodes) ** 3 * _FLOP
     fits = dense_bytes(nodes) < _LARGEST
     return {
         "table": local + exact if fits else np.inf,
+        "averaged": local + exact + (_AVERAGED - 1) * build if fits else np.inf,
         "fft": local + exact + 4 * rounds * full if fits else np.inf,
         "pruned": local + exact + 4 * rounds * pruned if fits else np.inf,
         "krylov": local + (2 + _PRODUCTS) * rounds * min(full, pruned),

@@ -27,7 +27,8 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
     rate = max(simulation.driving_rates(), default=0.0)
     if rate:
         out["sperm number"] = length * (simulation.drag(filament) * rate / bending) ** 0.25
-        out["omega dt"] = rate * simulation.step_length
+    if simulation.cycles:
+        out["omega dt"] = max(simulation.cycles) * simulation.step_length
     stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
     out["EA L^2/A"] = stretching * length**2 / bending
     if case.thermal is not None and case.thermal.energy > 0:

@@ -30,7 +30,8 @@ Flow = Callable[[np.ndarray, float], np.ndarray]
 class Immersed:
     """What every grid fluid is made of: grid, kernel, eta, slip (n,), drag against spin (n,) or None, background flow.
 
-    ``rods`` are the node ranges of the filaments: a node feels the stiffness of its own filament only.
+    ``rods`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is
+    the type of the mobility table's numbers, float or single precision (relative error about 1e-7).
     """
 
     grid: Grid
@@ -40,6 +41,7 @@ class Immersed:
     spin_drag: np.ndarray | None
     flow: Flow | None = None
     rods: tuple[slice, ...] = ()
+    number: type = np.float64
 
     def spin(self) -> np.ndarray:
         """The drag of each node against spin; zeros where nothing twists."""

@@ -54,12 +54,6 @@ NOT_BUILT: list[Row] = [
         "the other kinds",
     ),
     Row(_fluid("model", lambda f: f.model == "navier-stokes"), "the Navier-Stokes fluid", '"rft" or "stokes"'),
-    Row(
-        _grid("method", lambda f: f.method == "averaged"),
-        "this method",
-        '"auto", "fft", "pruned", "table" or "krylov"',
-    ),
-    Row(_grid("precision", lambda f: f.precision != "double"), "single precision", '"double"'),
     Row(_grid("rotation", lambda f: f.rotation != "local"), "torque coupling to the grid", '"local"'),
 ]
 

@@ -37,6 +37,25 @@ def _section(title: str, lines: list[str]) -> list[str]:
     return [f"{title}:", *(f"  {line}" for line in lines), ""]
 
 
+_END = {
+    "force": "force",
+    "follower": "follower force",
+    "moment": "moment",
+    "spring": "spring",
+    "moves": "prescribed motion",
+    "spin": "spin",
+    "angle": "prescribed turn",
+}
+_LOADS = {
+    "force": "force per length",
+    "body_force": "body force",
+    "moment": "active moment",
+    "internal_moment": "internal moment",
+    "weight": "weight",
+    "tether": "tethers",
+}
+
+
 def modelled(case: Case) -> list[str]:
     """Each term the case asks for, one line each."""
     out = []
@@ -44,11 +63,16 @@ def modelled(case: Case) -> list[str]:
         terms = ["bending", "stretching"] + (["twisting"] if f.twisting is not None else [])
         if any(k.constant != 0 for k in (*f.curvature, f.twist_rate)):
             terms.append("preferred strains")
+        if f.law.kind != "linear":
+            terms.append(f"{f.law.kind} law")
         for side, end in (("start", f.start), ("finish", f.finish)):
             terms.append(f"{side} {end.end}")
-            if end.follower is not None:
-                terms.append(f"follower force at {side}")
+            given = [word for key, word in _END.items() if getattr(end, key) is not None]
+            terms += [f"{word} at {side}" for word in given]
+        terms += [word for key, word in _LOADS.items() if getattr(f.loads, key, None) is not None]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
+    if case.fluid.flow is not None:
+        out.append("a background flow, which moves the nodes and does not spin them")
     if case.contact is not None:
         out.append(_contact(case.contact))
     fluid = case.fluid
@@ -122,14 +146,17 @@ def memory(simulation: Simulation) -> dict[str, float]:
 
     cells = simulation.grid.cells
     rim = KERNELS[case.fluid.kernel].points - 1
-    out["mobility table"] = 8.0 * 6 * float(np.prod(cells // 2 + 1 + 2 * rim))
+    number = 4.0 if case.fluid.precision == "single" else 8.0
+    out["mobility table"] = number * 6 * float(np.prod(cells // 2 + 1 + 2 * rim))
+    if simulation.method == "averaged":
+        out["averaged table"] = 8.0 * 6 * float(np.prod(2 * (cells // 2 + 5)))
     blocks = [n] if simulation.method != "krylov" else [f.nodes for f in case.filaments.values()]
     if simulation.method == "krylov":
         out["preconditioner"] = sum(8.0 * (3 * k) ** 2 for k in blocks) + 2 * out["band matrix"]
         out["Krylov vectors"] = 60 * 8.0 * 3 * n
     else:
         out["dense matrices"] = costs.dense_bytes(n)
-    if simulation.method != "table" or case.output.grid_every is not None:
+    if simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
         out["fields and their transforms"] = 2 * 3 * 8.0 * float(np.prod(cells))
     return out
 

@@ -74,19 +74,18 @@ def _system(stiffness, drag: Drag, e3, moved, force, inverse):
 def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, profile, unit):
     """Solves (K - Z/tau) d = Z moved/tau - f with d = value (k,) at the held unknowns (k,).
 
-    Returns d, the force felt Z (moved + d)/tau, the right side, and whether elimination without pivoting went well;
-    ``stiffness`` is used up, ``unit`` a tuple of m entries.
+    Returns d, the force felt Z (moved + d)/tau, and whether elimination without pivoting went well; if not, d is of no
+    use. ``stiffness`` is used up, ``unit`` a tuple of m entries.
     """
     m, width = stiffness.shape[1:]
-    right = _system(stiffness, drag, e3, moved, force, inverse)
+    d = _system(stiffness, drag, e3, moved, force, inverse)
     for k in range(held.size):
         i, a = held[k] // m, held[k] % m
         stiffness[i, a, :] = 0.0
         stiffness[i, a, (width - m) // 2 + a] = 1.0
-        right[i, a] = value[k]
-    d = right.copy()
+        d[i, a] = value[k]
     good = banded.eliminate(stiffness, d, profile.first, profile.last, unit)
-    return d, resist(drag, e3, (moved + d) * inverse), right, good
+    return d, resist(drag, e3, (moved + d) * inverse), good
 
 
 class _Response:
@@ -116,10 +115,12 @@ class _Response:
         nodes = np.unique(held.at // m) if held.at.size else held.at
         rows = stiffness[nodes] if nodes.size else stiffness[:0]
         value = held.value - y.ravel()[held.at] if nodes.size else held.value
-        d, felt, right, good = _correct(
+        d, felt, good = _correct(
             *(stiffness, self.drag, self.e3, moved, force, inverse, held.at, value, self.profile, (0,) * m)
         )
         if not good:
+            right = inverse * resist(self.drag, self.e3, moved) - force
+            right.ravel()[held.at] = value
             d = banded.solve_pivoted(stiffness, right)
             felt = resist(self.drag, self.e3, (moved + d) * inverse)
         if not nodes.size:

@@ -140,7 +140,7 @@ class Simulation:
     @property
     def _transforms(self) -> bool:
         """Whether steps transform fields."""
-        return self.method not in ("rft", "table")
+        return self.method not in ("rft", "table", "averaged")
 
     def _learn(self) -> None:
         from . import transforms
@@ -156,10 +156,11 @@ class Simulation:
 
     def driving_rates(self) -> list[float]:
         """How fast the scene is driven, radians per time: by what changes in time, and by what pushes."""
-        return self._cycles + self._pushes
+        return self.cycles + self._pushes
 
     @cached_property
-    def _cycles(self) -> list[float]:
+    def cycles(self) -> list[float]:
+        """How fast it is driven by what changes in time."""
         return driving.cycles(self)
 
     @cached_property
@@ -192,7 +193,7 @@ class Simulation:
             return float(self.case.time.step)
         if self.case.time.scheme == "explicit":
             return 0.5 * self.explicit_limit()
-        step = timescales.implicit_step(self._cycles, self._pushes, self.bending_time())
+        step = timescales.implicit_step(self.cycles, self._pushes, self.bending_time())
         if self._noise is not None:
             # The trapezoid forgets its stiffest mode in dt^2/(2 limit): no later than the softest is forgotten.
             step = min(step, float(np.sqrt(2 * self.explicit_limit() * self.bending_time())))
@@ -405,14 +406,13 @@ class Simulation:
 
     def state(self) -> dict[str, np.ndarray | float | int | str]:
         """All that is needed to go on bit for bit, also between two outputs."""
-        shape = self.state_now.shape
         velocity, force, reaction = self._motion()
         return {
             "time": self.time,
             "steps": self.steps,
             "iterations": self._iterations,
-            "position": shape.r,
-            "e1": shape.e1,
+            # Whole: measured again from r and e1 it may differ in the last bit (compilers fuse a b + c as they like).
+            "shape": self.state_now.shape.table,
             "y_old": self.state_now.y_old,
             "dt_old": self.state_now.dt_old,
             "velocity": velocity,
@@ -432,7 +432,7 @@ class Simulation:
             raise CaseError([f"{self.case.file}: laws: found {found}; the run began with {wanted}"])
         array = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
         number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
-        shape = self.mechanics.measure(array["position"], array["e1"])
+        shape = Geometry(array["shape"])
         self.state_now = State(number["time"], shape, array["y_old"], number["dt_old"])
         self._last = (array["velocity"], array["force"], array["reaction"])
         self.steps, self._iterations = int(number["steps"]), int(number["iterations"])

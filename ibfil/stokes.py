@@ -3,7 +3,8 @@
 table    the exact mobility matrix, solved densely: cost free of the grid's size, for some hundreds of nodes
 fft      the grid itself, implicit steps by GMRES preconditioned by the exact matrix of all nodes: the reference
 pruned   the same with transforms of the filaments' bounding box only
-krylov   either, for many nodes: the preconditioner is the exact matrix rod by rod, kept over several steps
+averaged an approximation of the table, on request only
+krylov   either FFT, for many nodes: the preconditioner is the exact matrix rod by rod, kept over several steps
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from . import mobility
+from . import averaged, mobility
 from .fluid import Memoryless
 from .grid import Grid, interpolate, project, spread
 from .immersed import Immersed, ImmersedResponse, Positions, RodStiffness
@@ -67,12 +68,11 @@ def dense_system(matrix: np.ndarray, stiffness: np.ndarray, tau: float, index: n
     return system
 
 
-class _Table(ImmersedResponse):
-    """The dense matrix of the exact table."""
+class _Dense(ImmersedResponse):
+    """A dense mobility matrix (n, 3, n, 3), exact or averaged."""
 
-    def __init__(self, fluid: Immersed, table: np.ndarray, r: np.ndarray, time: float, tau: float) -> None:
+    def __init__(self, fluid: Immersed, matrix: np.ndarray, r: np.ndarray, time: float, tau: float) -> None:
         super().__init__(fluid, r, time, tau)
-        matrix = mobility.mobility(table, fluid.grid.cells, self.base, self.weights, fluid.slip)
         self.matrix = matrix.reshape(3 * len(r), 3 * len(r))
 
     def apply(self, force: np.ndarray) -> np.ndarray:
@@ -91,7 +91,8 @@ class Tabulated(Memoryless):
 
     def __init__(self, fluid: Immersed) -> None:
         self.fluid = fluid
-        self._table = mobility.octant(mobility.point_response(fluid.grid, fluid.viscosity), fluid.kernel.points)
+        response = mobility.point_response(fluid.grid, fluid.viscosity)
+        self._table: np.ndarray = mobility.octant(response, fluid.kernel.points).astype(fluid.number)
 
     def velocity_at(self, points: np.ndarray, r: np.ndarray, force: np.ndarray, time: float) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of forces (n, 3) at r (n, 3)."""
@@ -106,9 +107,25 @@ class Tabulated(Memoryless):
 class StokesByTable(Tabulated):
     """IB Stokes by the exact mobility table: a small dense solve with the true operator."""
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Table:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Dense:
         """The mobility of nodes r (n, 3)."""
-        return _Table(self.fluid, self._table, r, time, tau)
+        fluid = self.fluid
+        matrix = mobility.mobility(self._table, fluid.grid.cells, *fluid.stencil(r), fluid.slip)
+        return _Dense(fluid, matrix, r, time, tau)
+
+
+class StokesByAverage(Tabulated):
+    """The stated approximation of averaged.py: cheaper by the kernel's size, and blind to where nodes lie in a cell."""
+
+    def __init__(self, fluid: Immersed) -> None:
+        super().__init__(fluid)
+        self._averaged = averaged.table(mobility.point_response(fluid.grid, fluid.viscosity), fluid.kernel)
+
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Dense:
+        """The averaged mobility of nodes r (n, 3)."""
+        fluid = self.fluid
+        matrix = averaged.mobility(self._averaged, fluid.grid.cells, fluid.grid.coordinates(r), fluid.slip)
+        return _Dense(fluid, matrix, r, time, tau)
 
 
 class _Blocks(NamedTuple):

@@ -115,7 +115,7 @@ class TorqueFree(Mechanics):
         return measure(self.mesh, r, normal / np.sqrt(_dot(normal, normal))[:, None])
 
     def measure(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
-        """Strains and spacing of r and e1 (n, 3)."""
+        """Strains and spacing of r and e1 (n, 3), e1 as it is."""
         return measure(self.mesh, r, e1)
 
     def move(self, start: Geometry, y: np.ndarray) -> Geometry:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scenes import RFT, scene
 
+from ibfil.report import modelled
 from ibfil.simulation import Simulation
 
 PERP = 4 * np.pi
@@ -73,3 +74,37 @@ def test_a_flow_is_resolved_by_its_change_along_the_rod() -> None:
     soft = {"bending": 1e-6, "direction": [0, 1, 0]}
     assert step(soft, ["3*y", 0, 0]) == pytest.approx(1 / 3 / 25, rel=1e-6)
     assert step(soft, [100, 0, 0]) == step(soft)
+
+
+def test_only_what_oscillates_has_an_omega_dt_to_be_warned_of() -> None:
+    """A rod on its way to rest may be stepped as coarsely as one likes."""
+    rods = {"weight": {**ROD, "loads": {"weight": [0, 0, -5.0]}}, "wave": {**ROD, "curvature": [WAVE, 0]}}
+    for name, rod in rods.items():
+        simulation = Simulation(scene({"rod": rod}, end=100.0, step=1.0))
+        assert ("omega dt" in simulation.groups) == (name == "wave")
+        assert any("omega dt = 3" in line for line in simulation.warnings) == (name == "wave")
+        assert "sperm number" in simulation.groups
+
+
+def test_the_report_names_every_load_and_law() -> None:
+    """`ibfil check` says what is modelled."""
+    ends = {"force": [0, 0, 1], "moment": [0, 1, 0], "follower": 1, "spring": {"stiffness": 1}}
+    loads = {
+        "force": [0, 0, 1],
+        "body_force": [0, 0, 1],
+        "moment": [0, 0, 1],
+        "internal_moment": [1, 0],
+        "weight": [0, 0, 1],
+        "tether": {"stiffness": 1},
+    }
+    law = {"kind": "two-well", "wells": [-1, 1], "barrier": 1, "gradient": 1}
+    held = {"end": "clamped", "spin": 1, "moves": ["t", 0, 0]}
+    rods = {"full": {**ROD, "law": law, "start": held, "finish": ends, "loads": loads}, "bare": ROD}
+    full, bare, flow, *_ = modelled(scene(rods, {**RFT, "flow": [1, 0, 0]}))
+    words = "two-well law, start clamped, prescribed motion at start, spin at start, finish free, force at finish, "
+    words += (
+        "follower force at finish, moment at finish, spring at finish, force per length, body force, active moment, "
+    )
+    assert full.endswith(words + "internal moment, weight, tethers")
+    assert bare.endswith("stretching, twisting, start free, finish free")
+    assert flow.startswith("a background flow")

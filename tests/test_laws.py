@@ -338,16 +338,19 @@ class Cubic:
 
 
 class Varying(Cubic):
-    """A preferred curvature that varies along s and in time: it sees where and when it is asked."""
+    """Preferred curvature and twist that vary along s and in time: it sees where and when it is asked."""
 
     def bending(self, strain: np.ndarray, s: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
         moment = strain.copy()
         moment[:, 0] -= np.sin(3 * s) * time
         return moment, np.tile(np.eye(2), (len(s), 1, 1))
 
+    def twisting(self, strain: np.ndarray, s: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
+        return 0.6 * (strain - 2 * s * time), np.full(len(s), 0.6)
+
 
 def test_a_law_from_python_is_the_one_of_the_case_that_says_the_same() -> None:
-    """Cubic is "stiffening" with coefficient 1 and exponent 2, in three dimensions; Varying a curvature of s and t."""
+    """Cubic is "stiffening" with coefficient 1 and exponent 2, in three dimensions; Varying has strains of s and t."""
     keys = {**TWISTING, "start": CLAMPED, "finish": {"moment": [1, 2, 3]}}
     ends = []
     for law, laws in (({"kind": "stiffening", "coefficient": 1, "exponent": 2}, {}), ({}, {"rod": Cubic()})):
@@ -359,10 +362,12 @@ def test_a_law_from_python_is_the_one_of_the_case_that_says_the_same() -> None:
     assert ends[0].r == pytest.approx(ends[1].r, abs=1e-11)
     assert ends[0].e1 == pytest.approx(ends[1].e1, abs=1e-11)
     assert np.abs(ends[0].bend).max() > 0.5
-    varying = Simulation(scene({"rod": ROD}, end=1.0, step=0.1), laws={"rod": Varying()})
+    varying = Simulation(scene({"rod": TWISTING}, end=1.0, step=0.1), laws={"rod": Varying()})
     varying.advance(1.0, lambda: None)
-    plain = run(scene({"rod": {**ROD, "curvature": ["sin(3*s)*t", 0]}}, end=1.0, step=0.1))
+    strains = {"curvature": ["sin(3*s)*t", 0], "twist_rate": "2*s*t"}
+    plain = run(scene({"rod": {**TWISTING, **strains}}, end=1.0, step=0.1))
     assert varying.shape.r == pytest.approx(plain.shape.r, abs=1e-12)
+    assert varying.shape.e1 == pytest.approx(plain.shape.e1, abs=1e-12)
 
 
 def test_a_law_for_a_filament_there_is_not_is_refused() -> None:

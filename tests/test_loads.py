@@ -55,7 +55,7 @@ def half(simulation: Simulation) -> np.ndarray:
 def test_an_end_moment_bends_a_rod_into_a_circular_arc_of_curvature_m_over_a(
     end: str, about: int, frame: str, derivative: int
 ) -> None:
-    """M(L) = +m and M(0) = -m all along the rod; a ribbon, so that e1 and e2 are not taken for one another."""
+    """M(L) = +m and M(0) = -m all along, and no tension; a ribbon, so that e1 and e2 are not taken for one another."""
     m, bending = 2.0, (1.0, 0.8)
     curvature = (1 if end == "finish" else -1) * m / bending[about]
     other = {"start": "finish", "finish": "start"}[end]
@@ -63,7 +63,7 @@ def test_an_end_moment_bends_a_rod_into_a_circular_arc_of_curvature_m_over_a(
     moment[about] = m
     if frame == "lab":  # e1 = z, e2 = e3 x e1 = -y
         moment = [0.0, -moment[1], moment[0]]
-    errors, strains = [], []
+    errors, strains, tensions = [], [], []
     for nodes in (17, 33, 65):
         keys = {other: CLAMPED, end: {"moment": moment, "frame": frame}}
         simulation = settled({**ROD, **keys, "bending": list(bending), "nodes": nodes, "derivative": derivative})
@@ -74,12 +74,14 @@ def test_an_end_moment_bends_a_rod_into_a_circular_arc_of_curvature_m_over_a(
         inside, loaded = (slice(0, -1), -1) if end == "finish" else (slice(1, None), 0)
         expected = np.zeros(3)
         expected[about] = m if end == "finish" else -m
+        tensions.append(np.abs(rod.tension).max())
         assert rod.moment[loaded] == pytest.approx(expected, abs=1e-12)
         strains.append(np.abs(rod.strain[inside, about] - curvature).max())
     assert errors[-1] < 1e-4
     assert slopes(errors)[-1] > 1.9
     assert strains[-1] < 1e-5
     assert slopes(strains)[-1] > 1.9
+    assert slopes(tensions)[-1] > 1.9
 
 
 def test_a_moment_fixed_in_the_lab_winds_a_rod_into_a_helix_about_it() -> None:
