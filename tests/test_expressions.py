@@ -504,10 +504,10 @@ HOSTILE = [
 
 @pytest.mark.parametrize("text", HOSTILE, ids=lambda text: ascii(text[:40]) + f" {len(text)}")
 def test_refused_at_once_with_a_reason(text):
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(ExpressionError) as caught:
         parse(text, VARIABLES, PARAMETERS)
-    assert time.perf_counter() - started < 1.0
+    assert time.process_time() - started < 1.0
     assert 0 < len(str(caught.value)) < 300
 
 
@@ -617,10 +617,10 @@ LARGEST = [
 
 @pytest.mark.parametrize("text", LARGEST, ids=lambda text: text[:20])
 def test_the_largest_allowed_are_compiled_quickly_and_rightly(text):
-    started = time.perf_counter()
+    started = time.process_time()
     expression = parse(text, VARIABLES)
     value = expression.bind("s", "t")(np.array([0.25, 0.5]), 0.5)
-    assert time.perf_counter() - started < 2.0
+    assert time.process_time() - started < 2.0
     assert value == pytest.approx([expression.at(s=0.25, t=0.5), expression.at(s=0.5, t=0.5)], rel=1e-9)
 
 
