@@ -11,16 +11,15 @@ import numpy as np
 from numba import njit
 
 from . import assemble, driving, timescales
+from .camera import Camera, Moment
 from .errors import CaseError, RunFailed
-from .frames import FilamentFrame, Frame
 from .geometry import Geometry
-from .loads import EndMoment
 from .marching import ControlledSteps, EvenSteps
 from .stepping import State, Step
 
 if TYPE_CHECKING:
     from .case import Case
-    from .fields import GridFields
+    from .frames import Frame
     from .laws import MomentLaw
 
 _LONGEST, _SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
@@ -63,6 +62,7 @@ class Simulation:
         if case.fluid.model != "rft":
             self._learn()
         self.fluid, self.method, self.grid = assemble.fluid(case, self._rods)
+        self._camera = Camera(case, self._rods, self.fluid, self.grid)
         self._noise = assemble.noise(case, self._rods)
         self._stepper = assemble.stepper(case, self._noise)
         n, m = len(self._rods.s), self.mechanics.unknowns
@@ -73,7 +73,6 @@ class Simulation:
         )
         self.steps = self._iterations = 0
         self.notices: list[str] = []  # what has happened and nobody was told yet
-        self._fields: GridFields | None = None
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         if self._transforms:
             self._remember()
@@ -329,78 +328,7 @@ class Simulation:
 
     def frame(self, fields: Sequence[str] = ()) -> Frame:
         """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
-        velocity, force, reaction = self._motion()
-        shape = self.state_now.shape
-        moment, strain = self._nodal_moment()
-        filaments = {}
-        for name, description, where in zip(self._rods.names, self._rods.filaments, self._rods.nodes, strict=True):
-            segment = slice(where.start, where.stop - 1)
-            stretch = shape.length[segment] / self.mechanics.mesh.ds[segment] - 1.0
-            ends = (
-                reaction[i, :3].copy() if end.end != "free" else None
-                for i, end in ((where.start, description.start), (where.stop - 1, description.finish))
-            )
-            filaments[name] = FilamentFrame(
-                shape.r[where].copy(),
-                velocity[where, :3].copy(),
-                force[where, :3].copy(),
-                shape.e1[where].copy(),
-                moment[where],
-                strain[where],
-                self.mechanics.stretching[segment] * stretch,
-                *ends,
-            )
-        grid = self._grid_fields(fields, force) if fields else None
-        return Frame(self.time, filaments, self._diagnostics(velocity, force), grid)
-
-    def _nodal_moment(self) -> tuple[np.ndarray, np.ndarray]:
-        """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""
-        shape, mesh = self.state_now.shape, self.mechanics.mesh
-        moment = self.mechanics.moment(shape, self.time)
-        beside = mesh.joined.astype(float) + np.append(False, mesh.joined[:-1])
-        thirds = []
-        for half in (moment.twist, shape.twist):
-            half = np.where(mesh.joined, half, 0.0)
-            thirds.append((half + np.append(0.0, half[:-1])) / beside)
-        nodal = np.column_stack([moment.bend, thirds[0]])
-        for load in self.mechanics.loads:
-            if isinstance(load, EndMoment):  # the law's own is zero there
-                i = int(load.node[0])
-                nodal[i] = np.stack([shape.e1[i], shape.e2[i], shape.e3[i]]) @ load.moment(shape, self.time)
-        return nodal, np.column_stack([shape.bend, thirds[1]])
-
-    def _diagnostics(self, velocity: np.ndarray, force: np.ndarray) -> dict[str, float | np.ndarray]:
-        shape, mesh = self.state_now.shape, self.mechanics.mesh
-        stretch = (shape.length / mesh.ds)[mesh.joined] - 1.0
-        torque = np.cross(shape.r, force[:, :3]).sum(axis=0)
-        if force.shape[1] == 4:
-            torque = torque + (force[:, 3:] * shape.e3).sum(axis=0)
-        out: dict[str, float | np.ndarray] = {
-            "net_force": force[:, :3].sum(axis=0),
-            "net_torque": torque,
-            "stretch_max": float(stretch.max()),
-            "stretch_min": float(stretch.min()),
-            "power": float(np.sum(velocity * force)),
-            "newton_iterations": float(self._iterations),
-            "steps_shortened": float(self.shortened),
-        }
-        if self.grid is not None and self.case.output.probes:
-            points = np.array(self.case.output.probes)
-            out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, force[:, :3], self.time)
-        if self._rods.contact is not None:
-            out |= {"contacts": float(self.contacts), "first_contact": self._rods.contact.since}
-        return out
-
-    def _grid_fields(self, fields: Sequence[str], force: np.ndarray) -> dict[str, np.ndarray]:
-        """Fields on the grid: one evaluation of the fluid."""
-        assert self.grid is not None
-        if self._fields is None:
-            from .fields import GridFields
-
-            fluid = self.case.fluid
-            self._fields = GridFields(self.grid, fluid.viscosity, assemble.flow(self.case), self.case.compute.threads)
-        base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(self.state_now.shape.r))
-        return self._fields.evaluate(base, weights, np.ascontiguousarray(force[:, :3]), self.time, fields)
+        return self._camera.frame(Moment(self.state_now, *self._motion(), self._iterations, self.shortened), fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
 

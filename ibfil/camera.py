@@ -1,0 +1,116 @@
+"""What an output shows: the frame of all filaments at one moment, its diagnostics, and fields where asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import assemble
+from .frames import FilamentFrame, Frame
+from .loads import EndMoment
+
+if TYPE_CHECKING:
+    from .assemble import Stacked
+    from .case import Case
+    from .fields import GridFields
+    from .fluid import Fluid
+    from .grid import Grid
+    from .stepping import State
+
+
+class Moment(NamedTuple):
+    """A simulation at one moment: the state, and velocity, force on the fluid, reaction (n, m) of the step to it."""
+
+    state: State
+    velocity: np.ndarray
+    force: np.ndarray
+    reaction: np.ndarray
+    iterations: int
+    shortened: int
+
+
+class Camera:
+    """Takes frames of one scene. Fields cost an evaluation of the fluid; their plans are made at the first."""
+
+    def __init__(self, case: Case, rods: Stacked, fluid: Fluid, grid: Grid | None) -> None:
+        self.case, self.fluid, self.grid = case, fluid, grid
+        self._rods, self._mechanics = rods, rods.mechanics
+        self._fields: GridFields | None = None
+
+    def frame(self, now: Moment, fields: Sequence[str] = ()) -> Frame:
+        """All filaments with diagnostics, and the ``fields`` named."""
+        shape = now.state.shape
+        moment, strain = self._nodal_moment(now.state)
+        filaments = {}
+        for name, description, where in zip(self._rods.names, self._rods.filaments, self._rods.nodes, strict=True):
+            segment = slice(where.start, where.stop - 1)
+            stretch = shape.length[segment] / self._mechanics.mesh.ds[segment] - 1.0
+            ends = (
+                now.reaction[i, :3].copy() if end.end != "free" else None
+                for i, end in ((where.start, description.start), (where.stop - 1, description.finish))
+            )
+            filaments[name] = FilamentFrame(
+                shape.r[where].copy(),
+                now.velocity[where, :3].copy(),
+                now.force[where, :3].copy(),
+                shape.e1[where].copy(),
+                moment[where],
+                strain[where],
+                self._mechanics.stretching[segment] * stretch,
+                *ends,
+            )
+        grid = self._grid_fields(fields, now) if fields else None
+        return Frame(now.state.time, filaments, self._diagnostics(now), grid)
+
+    def _nodal_moment(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""
+        shape, mesh = state.shape, self._mechanics.mesh
+        moment = self._mechanics.moment(shape, state.time)
+        beside = mesh.joined.astype(float) + np.append(False, mesh.joined[:-1])
+        thirds = []
+        for half in (moment.twist, shape.twist):
+            half = np.where(mesh.joined, half, 0.0)
+            thirds.append((half + np.append(0.0, half[:-1])) / beside)
+        nodal = np.column_stack([moment.bend, thirds[0]])
+        for load in self._mechanics.loads:
+            if isinstance(load, EndMoment):  # the law's own is zero there
+                i = int(load.node[0])
+                nodal[i] = np.stack([shape.e1[i], shape.e2[i], shape.e3[i]]) @ load.moment(shape, state.time)
+        return nodal, np.column_stack([shape.bend, thirds[1]])
+
+    def _diagnostics(self, now: Moment) -> dict[str, float | np.ndarray]:
+        shape, mesh, force = now.state.shape, self._mechanics.mesh, now.force
+        stretch = (shape.length / mesh.ds)[mesh.joined] - 1.0
+        torque = np.cross(shape.r, force[:, :3]).sum(axis=0)
+        if force.shape[1] == 4:
+            torque = torque + (force[:, 3:] * shape.e3).sum(axis=0)
+        out: dict[str, float | np.ndarray] = {
+            "net_force": force[:, :3].sum(axis=0),
+            "net_torque": torque,
+            "stretch_max": float(stretch.max()),
+            "stretch_min": float(stretch.min()),
+            "power": float(np.sum(now.velocity * force)),
+            "newton_iterations": float(now.iterations),
+            "steps_shortened": float(now.shortened),
+        }
+        if self.grid is not None and self.case.output.probes:
+            points = np.array(self.case.output.probes)
+            out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, force[:, :3], now.state.time)
+        contact = self._rods.contact
+        if contact is not None:
+            out |= {"contacts": float(contact.near(shape.r).i.size), "first_contact": contact.since}
+        return out
+
+    def _grid_fields(self, fields: Sequence[str], now: Moment) -> dict[str, np.ndarray]:
+        """Fields on the grid: one evaluation of the fluid."""
+        assert self.grid is not None
+        if self._fields is None:
+            from .fields import GridFields
+
+            fluid = self.case.fluid
+            self._fields = GridFields(self.grid, fluid.viscosity, assemble.flow(self.case), self.case.compute.threads)
+        base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
+        force = np.ascontiguousarray(now.force[:, :3])
+        return self._fields.evaluate(base, weights, force, now.state.time, fields)
