@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .case import Case, parse_case, read_case
     from .errors import CaseError, Interrupted, RunFailed
+    from .members import Member, Outcome, run_members
     from .record import RunFile
     from .running import run
     from .simulation import Simulation
@@ -26,6 +27,9 @@ _HOME = {
     "CaseError": "errors",
     "Interrupted": "errors",
     "RunFailed": "errors",
+    "Member": "members",
+    "Outcome": "members",
+    "run_members": "members",
     "RunFile": "record",
     "run": "running",
     "Simulation": "simulation",
@@ -36,6 +40,8 @@ __all__ = [
     "Case",
     "CaseError",
     "Interrupted",
+    "Member",
+    "Outcome",
     "RunFailed",
     "RunFile",
     "Simulation",
@@ -43,6 +49,7 @@ __all__ = [
     "parse_case",
     "read_case",
     "run",
+    "run_members",
     "write_vtk",
 ]
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from . import __version__
 from .errors import CaseError, Interrupted, RunFailed
+from .threads import set_threads
 
 if TYPE_CHECKING:
     from .case import Case
@@ -130,13 +131,6 @@ def _only_changes(words: Sequence[str]) -> None:
     stray = [f"{word}: found a word; allowed: KEY=VALUE" for word in words if "=" not in word]
     if stray:
         raise CaseError(stray)
-
-
-def set_threads(threads: int) -> None:
-    """Give numpy's and numexpr's libraries this many threads. Has effect only before numpy is imported."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_MAX_THREADS"):
-        os.environ[name] = str(threads)
-    os.environ["OMP_WAIT_POLICY"] = "passive"
 
 
 def _say_if_cold() -> None:

@@ -15,6 +15,7 @@ from . import checkpoint
 from .errors import Interrupted, RunFailed, Stopped
 from .expectations import Check, check
 from .observe import Observers, Summary
+from .pace import Pace
 from .progress import Progress, Signals
 from .record import checkpoint_path
 from .recorder import GridPlace, Meaning, Recorder, record_end
@@ -85,6 +86,7 @@ class Loop:
         self._path: Path | None = None
         self._frame: Frame | None = None
         self._began, self._spent = clock.monotonic(), 0.0  # now; seconds spent by the parts of the run before
+        self._pace = Pace()
         self._next_look = self._next_checkpoint = 0.0
         self._good: float | None = None  # time of the last checkpoint
         self._progress: Progress | None = None
@@ -129,6 +131,7 @@ class Loop:
         def work() -> tuple[str, str]:
             self._frame = self.simulation.frame()
             self._recorder = Recorder.resume(path, self.case, last.outputs, last.fields, self._grid_place())
+            self._pace = Pace(self._recorder.pace)
             self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
             slack, written = SAME * self.case.time.end, float(self._seen.times[-1])
             rest = []
@@ -172,6 +175,7 @@ class Loop:
             self._recorder.append(frame, values)
 
     def _after_step(self) -> None:
+        self._pace.step(self.simulation.time)
         while self.simulation.notices:
             self._log(f"warning: {self.simulation.notices.pop(0)}")
         if self._signals.caught:
@@ -198,7 +202,8 @@ class Loop:
 
     def _attributes(self) -> dict[str, Any]:
         simulation = self.simulation
-        return {"steps": simulation.steps, "wall_time": self._wall_time(), "wisdom": simulation.wisdom}
+        pace = self._pace.attributes(simulation.time)
+        return {"steps": simulation.steps, "wall_time": self._wall_time(), "wisdom": simulation.wisdom, **pace}
 
     def _checkpoint(self) -> None:
         """Have all outputs so far on the disk, then the state. Raises RunFailed."""

@@ -1,7 +1,7 @@
 """Reading a run file: what `ibfil run` wrote, as lazy arrays. The writing is in recorder.py.
 
     /            format, format_version, ibfil_version, case, created, finished, versions, method, wisdom,
-                 status, reason, steps, wall_time
+                 status, reason, steps, wall_time, pace_seconds, pace_processor, pace_time
     /time (T,)   /filaments/NAME/...   /observables/NAME   /diagnostics/NAME   /grid/time, /grid/FIELD
 
 A file may be read while its run goes on: it is opened without a lock, and shows whole outputs only.
@@ -22,6 +22,7 @@ import numpy as np
 from . import journal
 from .errors import CaseError
 from .frames import FilamentFrame, Frame
+from .pace import pace_of
 
 if TYPE_CHECKING:
     from .case import Case
@@ -245,6 +246,11 @@ class RunFile:
     def wall_time(self) -> float:
         """Seconds spent by the last output written, over all parts of a run that was cut."""
         return float(self._file.attrs["wall_time"])
+
+    @property
+    def pace(self) -> tuple[float, float, float]:
+        """Seconds, processor seconds and simulated time, start-up, compilation and first step left out (pace.py)."""
+        return pace_of(self._file)
 
     def _attribute(self, name: str) -> str:
         return str(self._file.attrs[name])

@@ -25,6 +25,7 @@ from . import __version__
 from .errors import RunFailed
 from .frames import Frame
 from .journal import Busy, JournaledFile
+from .pace import pace_of
 from .record import FORMAT, FORMAT_VERSION, RunFileError, checkpoint_path, journal_path
 from .units import label
 
@@ -163,6 +164,11 @@ class Recorder:
     def created(self) -> str:
         """When the run began: with the path, its name."""
         return str(self._open.attrs["created"])
+
+    @property
+    def pace(self) -> tuple[float, float, float]:
+        """What the parts of the run before have noted: seconds, processor seconds, simulated time."""
+        return pace_of(self._open)
 
     @property
     def _open(self) -> h5py.File:
