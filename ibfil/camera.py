@@ -97,7 +97,7 @@ class Camera:
         }
         if self.grid is not None and self.case.output.probes:
             points = np.array(self.case.output.probes)
-            out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, force[:, :3], now.state.time)
+            out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, shape.e3, force, now.state.time)
         contact = self._rods.contact
         if contact is not None:
             out |= {"contacts": float(contact.near(shape.r).i.size), "first_contact": contact.since}

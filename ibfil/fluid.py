@@ -52,8 +52,10 @@ class Fluid(Protocol):
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> Response:
         """The response at nodes r (n, 3) with unit tangents e3 (n, 3); flows and histories are those of ``time``."""
 
-    def velocity_at(self, points: np.ndarray, r: np.ndarray, force: np.ndarray, time: float) -> np.ndarray:
-        """The velocity (k, 3) at ``points`` (k, 3) when nodes r (n, 3) push with forces (n, 3)."""
+    def velocity_at(
+        self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
+    ) -> np.ndarray:
+        """The velocity (k, 3) at ``points`` (k, 3) when nodes r (n, 3), tangents e3, push with forces (n, m)."""
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """What the fluid carries from step to step, by name; part of a run's state. Empty for most."""

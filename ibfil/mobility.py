@@ -11,6 +11,9 @@ as a kernel: a pair is mirrored into the octant instead of each of its terms.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numba import njit
 from scipy.fft import irfftn
@@ -18,7 +21,11 @@ from scipy.fft import irfftn
 from .grid import Grid
 from .vectors import NOT_NEGATIVE
 
+if TYPE_CHECKING:
+    from .immersed import Nodes
+
 _COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_SIX = (0,) * 6
 
 
 def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
@@ -49,14 +56,16 @@ def octant(response: np.ndarray, points: int) -> np.ndarray:
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _pair(table, cells, base, weights, a, b, c, acc, sums):
-    """M_ab into ``sums`` (6,): xx, yy, zz, xy, xz, yz; ``c`` (3, 2 P - 1), ``acc`` (6 (2 P - 1),) are room to work in.
+def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit):
+    """All components of the table for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
 
-    Arrays are indexed in full in every loop: a view of one costs more here than the arithmetic.
+    ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` a tuple of k entries: what the compiler
+    knows of k. Returns the signs (3,) of the mirrored axes, for components beyond the sixth. Arrays are indexed in full
+    in every loop: a view of one costs more than the arithmetic.
     """
     p = weights.shape[2]
-    terms = 2 * p - 1
-    length = 6 * terms
+    terms, parts = 2 * p - 1, len(unit)
+    length = parts * terms
     corner = (0, 0, 0)
     sign = (1.0, 1.0, 1.0)
     for axis in range(3):
@@ -76,7 +85,7 @@ def _pair(table, cells, base, weights, a, b, c, acc, sums):
         elif axis == 1:
             corner, sign = (corner[0], at, 0), (sign[0], s, 1.0)
         else:
-            corner, sign = (corner[0], corner[1], 6 * at), (sign[0], sign[1], s)
+            corner, sign = (corner[0], corner[1], parts * at), (sign[0], sign[1], s)
     for k in range(length):
         acc[k] = 0.0
     for i in range(terms):
@@ -84,14 +93,15 @@ def _pair(table, cells, base, weights, a, b, c, acc, sums):
             w = c[0, i] * c[1, j]
             for k in range(length):
                 acc[k] += w * table[corner[0] + i, corner[1] + j, corner[2] + k]
-    for x in range(6):
+    for x in range(parts):
         sums[x] = 0.0
     for k in range(terms):
-        for x in range(6):
-            sums[x] += c[2, k] * acc[6 * k + x]
+        for x in range(parts):
+            sums[x] += c[2, k] * acc[parts * k + x]
     sums[3] *= sign[0] * sign[1]
     sums[4] *= sign[0] * sign[2]
     sums[5] *= sign[1] * sign[2]
+    return sign
 
 
 @njit(cache=True)
@@ -106,7 +116,7 @@ def pairs(table, cells, base, weights, slip, rows, columns):
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            _pair(table, cells, base, weights, a, b, c, acc, sums)
+            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX)
             for x in range(3):
                 out[i, x, j, x] = sums[x] + (slip[a] if a == b else 0.0)
             out[i, 0, j, 1] = out[i, 1, j, 0] = sums[3]
@@ -124,7 +134,7 @@ def mobility(table, cells, base, weights, slip):
     out = np.empty((n, 3, n, 3))
     for a in range(n):
         for b in range(a, n):
-            _pair(table, cells, base, weights, a, b, c, acc, sums)
+            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX)
             for x in range(3):
                 out[a, x, b, x] = out[b, x, a, x] = sums[x]
             out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = sums[3]
@@ -133,3 +143,46 @@ def mobility(table, cells, base, weights, slip):
         for x in range(3):
             out[a, x, a, x] += slip[a]
     return out
+
+
+class Translation:
+    """Forces move nodes (immersed.Coupling): three numbers a node go through the grid, all of them vectors."""
+
+    parts, vectors = 3, 1
+
+    def response(self, grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
+        """The velocity of a unit force on one cell."""
+        return point_response(grid, viscosity, alpha)
+
+    def matrix(self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray) -> np.ndarray:
+        """The whole mobility (3 n, 3 n)."""
+        n = len(own)
+        return mobility(table, cells, nodes.base, nodes.weights, own[:, 0]).reshape(3 * n, 3 * n)
+
+    def block(
+        self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray
+    ) -> np.ndarray:
+        """The mobility (3 k, 3 l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
+        out = pairs(table, cells, nodes.base, nodes.weights, own[:, 0], rows, columns)
+        return out.reshape(3 * len(rows), 3 * len(columns))
+
+    def own(self, slip: np.ndarray) -> np.ndarray:
+        """The slip, in each direction."""
+        return np.repeat(slip[:, None], 3, axis=1)
+
+    def lift(self, e3: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The forces."""
+        return np.ascontiguousarray(force[:, :3])
+
+    def drop(self, e3: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """The velocities."""
+        return motion
+
+    def carried(
+        self, flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, e3: np.ndarray, time: float
+    ) -> np.ndarray:
+        """The flow's velocity (n, 3)."""
+        return flow(r, time)
+
+
+TRANSLATION = Translation()

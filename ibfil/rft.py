@@ -160,6 +160,8 @@ class ResistiveForce(Memoryless):
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
         return _Response(self.drag, self.profile, e3, None if self.flow is None else self.flow(r, time), tau)
 
-    def velocity_at(self, points: np.ndarray, r: np.ndarray, force: np.ndarray, time: float) -> np.ndarray:
+    def velocity_at(
+        self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
+    ) -> np.ndarray:
         """The background velocity (k, 3): in this theory nodes do not move the fluid elsewhere."""
         return np.zeros_like(points) if self.flow is None else self.flow(points, time)

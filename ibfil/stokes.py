@@ -18,8 +18,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from . import averaged, mobility
 from .fluid import Memoryless
 from .grid import Grid, interpolate, project, spread
-from .immersed import Immersed, ImmersedResponse, Positions, RodStiffness
+from .immersed import Immersed, ImmersedResponse, Nodes
 from .transforms import VectorTransform
+from .turns import Reduced, RodStiffness
 
 _EXACT = 1e-11  # relative residual of GMRES where its preconditioner is the operator itself
 _LOOSE = 1e-6  # and where it is not: less than Newton gains in an iteration by the time it stops
@@ -27,10 +28,13 @@ _PATIENCE = 1.5  # times the products of its first solve, and a few, that a kept
 
 
 class Solver(Protocol):
-    """What turns nodal forces into nodal velocities by FFT: whole transforms, or pruned ones."""
+    """What turns the vectors that nodes put on the grid into those they take off it, by FFT: whole, or pruned."""
 
     def velocity(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """The velocity (n, 3) that forces (n, 3) with stencils (base, weights) drive at their own nodes."""
+        """The velocities (n, 3 v) that forces (n, 3 v) with stencils (base, weights) drive at their own nodes.
+
+        v = 2: torques after the forces, and half the vorticities after the velocities.
+        """
 
 
 class StokesSolve:
@@ -69,11 +73,13 @@ def dense_system(matrix: np.ndarray, stiffness: np.ndarray, tau: float, index: n
 
 
 class _Dense(ImmersedResponse):
-    """A dense mobility matrix (n, 3, n, 3), exact or averaged."""
+    """A dense mobility matrix (c n, c n), exact or averaged."""
 
-    def __init__(self, fluid: Immersed, matrix: np.ndarray, r: np.ndarray, time: float, tau: float) -> None:
-        super().__init__(fluid, r, time, tau)
-        self.matrix = matrix.reshape(3 * len(r), 3 * len(r))
+    def __init__(
+        self, fluid: Immersed, matrix: np.ndarray, r: np.ndarray, e3: np.ndarray, time: float, tau: float
+    ) -> None:
+        super().__init__(fluid, r, e3, time, tau)
+        self.matrix = matrix
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         return self.matrix @ force
@@ -81,9 +87,9 @@ class _Dense(ImmersedResponse):
     def columns(self, index: np.ndarray) -> np.ndarray:
         return self.matrix[:, index]
 
-    def solve(self, positions: Positions, right: np.ndarray) -> np.ndarray:
-        stiffness = positions.frozen().matrix(slice(0, len(self.base)))
-        return np.linalg.solve(dense_system(self.matrix, stiffness, self.tau, positions.index), right)
+    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+        stiffness = statement.frozen().matrix(slice(0, len(self.nodes.e3)))
+        return np.linalg.solve(dense_system(self.matrix, stiffness, self.tau, statement.index), right)
 
 
 class Tabulated(Memoryless):
@@ -91,27 +97,32 @@ class Tabulated(Memoryless):
 
     def __init__(self, fluid: Immersed) -> None:
         self.fluid = fluid
-        response = mobility.point_response(fluid.grid, fluid.viscosity)
+        response = fluid.coupling.response(fluid.grid, fluid.viscosity, 0.0)
         self._table: np.ndarray = mobility.octant(response, fluid.kernel.points).astype(fluid.number)
 
-    def velocity_at(self, points: np.ndarray, r: np.ndarray, force: np.ndarray, time: float) -> np.ndarray:
-        """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of forces (n, 3) at r (n, 3)."""
-        fluid, k, n = self.fluid, len(points), len(r)
-        base, weights = fluid.stencil(np.concatenate([points, r]))
-        slip, rows, columns = np.zeros(k + n), np.arange(k), np.arange(k, k + n)
-        pairs = mobility.pairs(self._table, fluid.grid.cells, base, weights, slip, rows, columns)
-        u = np.einsum("iajb,jb->ia", pairs, force)
+    def velocity_at(
+        self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
+    ) -> np.ndarray:
+        """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of forces (n, m) at r (n, 3)."""
+        fluid, k, n, c = self.fluid, len(points), len(r), self.fluid.coupling.parts
+        nodes = fluid.nodes(np.concatenate([points, r]), np.concatenate([np.zeros_like(points), e3]))
+        rows, columns = np.arange(k), np.arange(k, k + n)
+        block = fluid.coupling.block(self._table, fluid.grid.cells, nodes, np.zeros((k + n, c)), rows, columns)
+        u = (block @ force[:, :c].ravel()).reshape(k, c)[:, :3]
         return u if fluid.flow is None else u + fluid.flow(points, time)
+
+    def matrix(self, nodes: Nodes, own: np.ndarray) -> np.ndarray:
+        """The exact mobility (c n, c n) of nodes, with ``own`` (n, c) on its diagonal."""
+        return self.fluid.coupling.matrix(self._table, self.fluid.grid.cells, nodes, own)
 
 
 class StokesByTable(Tabulated):
     """IB Stokes by the exact mobility table: a small dense solve with the true operator."""
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Dense:
-        """The mobility of nodes r (n, 3)."""
+        """The mobility of nodes r (n, 3) with tangents e3 (n, 3)."""
         fluid = self.fluid
-        matrix = mobility.mobility(self._table, fluid.grid.cells, *fluid.stencil(r), fluid.slip)
-        return _Dense(fluid, matrix, r, time, tau)
+        return _Dense(fluid, self.matrix(fluid.nodes(r, e3), fluid.own), r, e3, time, tau)
 
 
 class StokesByAverage(Tabulated):
@@ -123,21 +134,22 @@ class StokesByAverage(Tabulated):
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Dense:
         """The averaged mobility of nodes r (n, 3)."""
-        fluid = self.fluid
+        fluid, n = self.fluid, len(r)
         matrix = averaged.mobility(self._averaged, fluid.grid.cells, fluid.grid.coordinates(r), fluid.slip)
-        return _Dense(fluid, matrix, r, time, tau)
+        return _Dense(fluid, matrix.reshape(3 * n, 3 * n), r, e3, time, tau)
 
 
 class _Blocks(NamedTuple):
-    """A preconditioner: LU factors of 1 - tau M K for each range of nodes."""
+    """A preconditioner: LU factors of 1 - tau M K for each range of nodes, ``parts`` unknowns a node."""
 
+    parts: int
     factors: list[tuple[slice, tuple[np.ndarray, np.ndarray]]]
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """The approximate x (3 n,)."""
+        """The approximate x (c n,)."""
         out = np.empty_like(right)
         for rod, factors in self.factors:
-            at = slice(3 * rod.start, 3 * rod.stop)
+            at = slice(self.parts * rod.start, self.parts * rod.stop)
             out[at] = lu_solve(factors, right[at], check_finite=False)
         return out
 
@@ -145,33 +157,33 @@ class _Blocks(NamedTuple):
 class _Fourier(ImmersedResponse):
     """FFT velocities; implicit steps by GMRES on them."""
 
-    def __init__(self, owner: StokesByFFT, r: np.ndarray, time: float, tau: float) -> None:
-        super().__init__(owner.fluid, r, time, tau)
-        self.owner, self.r = owner, r
+    def __init__(self, owner: StokesByFFT, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> None:
+        super().__init__(owner.fluid, r, e3, time, tau)
+        self.owner = owner
 
     def apply(self, force: np.ndarray) -> np.ndarray:
-        f = force.reshape(-1, 3)
-        u = self.owner.solver.velocity(self.base, self.weights, f) + self.fluid.slip[:, None] * f
-        return u.ravel()
+        f, nodes, coupling = force.reshape(-1, self.parts), self.nodes, self.fluid.coupling
+        moved = self.owner.solver.velocity(nodes.base, nodes.weights, coupling.lift(nodes.e3, f))
+        return (coupling.drop(nodes.e3, moved) + self.fluid.own * f).ravel()
 
     def columns(self, index: np.ndarray) -> np.ndarray:
-        nodes, parts = index // 3, index % 3
-        pairs = self.owner.pairs(self.base, self.weights, np.arange(len(self.base)), np.unique(nodes))
-        return pairs[:, 3 * np.searchsorted(np.unique(nodes), nodes) + parts]
+        nodes, parts = index // self.parts, index % self.parts
+        block = self.owner.block(self.nodes, np.arange(len(self.nodes.e3)), np.unique(nodes))
+        return block[:, self.parts * np.searchsorted(np.unique(nodes), nodes) + parts]
 
-    def solve(self, positions: Positions, right: np.ndarray) -> np.ndarray:
-        blocks = self.owner.preconditioner(self, positions)
-        x, count = self._gmres(positions, right, blocks)
+    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+        blocks = self.owner.preconditioner(self, statement)
+        x, count = self._gmres(statement, right, blocks)
         self.owner.took(count)
         return x
 
-    def _gmres(self, positions: Positions, right: np.ndarray, blocks: _Blocks) -> tuple[np.ndarray, int]:
-        free, index, count = positions.free, positions.index, 0
+    def _gmres(self, statement: Reduced, right: np.ndarray, blocks: _Blocks) -> tuple[np.ndarray, int]:
+        free, index, count = statement.free, statement.index, 0
 
         def product(x: np.ndarray) -> np.ndarray:
             nonlocal count
             count += 1
-            force = positions.times(free * x)
+            force = statement.times(free * x)
             force[index] += x[index]
             return free * x - self.tau * self.apply(force)
 
@@ -200,39 +212,37 @@ class StokesByFFT(Tabulated):
         self.solver = solver
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Fourier:
-        """The FFT operator between nodes r (n, 3)."""
-        return _Fourier(self, r, time, tau)
+        """The FFT operator between nodes r (n, 3) with tangents e3 (n, 3)."""
+        return _Fourier(self, r, e3, time, tau)
 
-    def pairs(self, base: np.ndarray, weights: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """The exact mobility (3 k, 3 l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
-        slip = self.fluid.slip
-        out = mobility.pairs(self._table, self.fluid.grid.cells, base, weights, slip, rows, columns)
-        return out.reshape(3 * len(rows), 3 * len(columns))
+    def block(self, nodes: Nodes, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """The exact mobility (c k, c l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
+        fluid = self.fluid
+        return fluid.coupling.block(self._table, fluid.grid.cells, nodes, fluid.own, rows, columns)
 
-    def preconditioner(self, response: _Fourier, positions: Positions) -> _Blocks:
+    def preconditioner(self, response: _Fourier, statement: Reduced) -> _Blocks:
         """The exact matrix of all nodes, factored."""
-        return self._factor(response.r, response.tau, positions.frozen(), (slice(0, len(response.r)),))
+        nodes = response.nodes
+        return self._factor(nodes, response.tau, statement.frozen(), (slice(0, len(nodes.e3)),))
 
     def took(self, count: int) -> None:
         """Told how many products a solve took."""
 
-    def _factor(self, r: np.ndarray, tau: float, rods: RodStiffness, ranges: tuple[slice, ...]) -> _Blocks:
-        factors = []
-        base, weights = self.fluid.stencil(r)
+    def _factor(self, nodes: Nodes, tau: float, rods: RodStiffness, ranges: tuple[slice, ...]) -> _Blocks:
+        factors, c = [], self.fluid.coupling.parts
         for rod in ranges:
-            cells, slip = self.fluid.grid.cells, self.fluid.slip[rod]
-            matrix = mobility.mobility(self._table, cells, base[rod], weights[rod], slip).reshape(3 * len(slip), -1)
-            inside = (rods.held >= 3 * rod.start) & (rods.held < 3 * rod.stop)
-            system = dense_system(matrix, rods.matrix(rod), tau, rods.held[inside] - 3 * rod.start)
+            matrix = self.matrix(nodes[rod], self.fluid.own[rod])
+            inside = (rods.held >= c * rod.start) & (rods.held < c * rod.stop)
+            system = dense_system(matrix, rods.matrix(rod), tau, rods.held[inside] - c * rod.start)
             factors.append((rod, lu_factor(system, overwrite_a=True, check_finite=False)))
-        return _Blocks(factors)
+        return _Blocks(c, factors)
 
 
 class _Kept(NamedTuple):
     """A preconditioner that is kept, and all it was made from."""
 
     blocks: _Blocks
-    r: np.ndarray
+    nodes: Nodes
     tau: float
     rods: RodStiffness
 
@@ -252,15 +262,15 @@ class StokesByKrylov(StokesByFFT):
         self._kept: _Kept | None = None
         self._tired, self._first = False, 0
 
-    def preconditioner(self, response: _Fourier, positions: Positions) -> _Blocks:
+    def preconditioner(self, response: _Fourier, statement: Reduced) -> _Blocks:
         """The kept factors, or new ones."""
         kept = self._kept
         if kept is None or self._tired or abs(kept.tau - response.tau) > 0.2 * response.tau:
-            kept = self._keep(response.r, response.tau, positions.frozen())
+            kept = self._keep(response.nodes, response.tau, statement.frozen())
         return kept.blocks
 
-    def _keep(self, r: np.ndarray, tau: float, rods: RodStiffness) -> _Kept:
-        self._kept = _Kept(self._factor(r, tau, rods, self.fluid.rods), r.copy(), tau, rods)
+    def _keep(self, nodes: Nodes, tau: float, rods: RodStiffness) -> _Kept:
+        self._kept = _Kept(self._factor(nodes, tau, rods, self.fluid.rods), nodes, tau, rods)
         self._tired, self._first = False, 0
         return self._kept
 
@@ -274,12 +284,13 @@ class StokesByKrylov(StokesByFFT):
         if self._kept is None:
             return {}
         kept = self._kept
-        named = {k: v for k, v in kept.rods._asdict().items() if v is not None}
-        return {"r": kept.r, "tau": kept.tau, "tired": float(self._tired), "first": float(self._first), **named}
+        named = {k: v for k, v in kept.rods._asdict().items() if v is not None} | vars(kept.nodes)
+        return {"tau": kept.tau, "tired": float(self._tired), "first": float(self._first), **named}
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:
         """Makes the factors of ``memory`` again."""
         arrays = {k: np.asarray(v) for k, v in memory.items()}
         rods = RodStiffness(arrays["band"], arrays["held"].astype(np.int64), arrays.get("turns"), arrays.get("still"))
-        self._keep(arrays["r"], float(arrays["tau"]), rods)
+        nodes = Nodes(arrays["base"].astype(np.int64), arrays["weights"], arrays["e3"])
+        self._keep(nodes, float(arrays["tau"]), rods)
         self._tired, self._first = bool(arrays["tired"]), int(arrays["first"])
