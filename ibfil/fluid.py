@@ -49,8 +49,18 @@ class Response(Protocol):
 class Fluid(Protocol):
     """A model of the fluid: turns a configuration into its response."""
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> Response:
-        """The response at nodes r (n, 3) with unit tangents e3 (n, 3); flows and histories are those of ``time``."""
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> Response:
+        """The response at nodes r (n, 3) with unit tangents e3 (n, 3); flows are those of ``time``.
+
+        ``w`` is dt/dt_old of BDF2, tau = dt (1 + w)/(1 + 2 w), and zero in a scheme that looks back one step only,
+        tau = dt: a fluid that remembers discretises its own past likewise. Asking changes nothing that it remembers.
+        """
+
+    def advance(self, response: Response, force: np.ndarray) -> None:
+        """The step that ``response``, the last one asked for, belongs to is taken: forces (n, m) acted over it."""
+
+    def longest_step(self) -> float:
+        """The longest step that the fluid's own motion allows now (units of time); infinite where it has none."""
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
@@ -66,6 +76,13 @@ class Fluid(Protocol):
 
 class Memoryless:
     """A fluid whose response depends on the present only."""
+
+    def advance(self, response: Response, force: np.ndarray) -> None:
+        """Nothing."""
+
+    def longest_step(self) -> float:
+        """As long as one likes."""
+        return np.inf
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """Nothing."""

@@ -156,7 +156,7 @@ class ResistiveForce(Memoryless):
     def __init__(self, drag: Drag, profile: banded.Profile, flow=None) -> None:
         self.drag, self.profile, self.flow = drag, profile, flow
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Response:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Response:
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
         return _Response(self.drag, self.profile, e3, None if self.flow is None else self.flow(r, time), tau)
 

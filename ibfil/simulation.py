@@ -257,6 +257,7 @@ class Simulation:
     def accept(self, step: Step, time: float) -> None:
         """Takes a step, which led to ``time``. Raises RunFailed where it led out of bounds, Stopped at a contact."""
         before, self.state_now = self.state_now, step.state._replace(time=time)
+        self.fluid.advance(step.response, step.force)
         self._last = (step.velocity, step.force, step.reaction)
         self.steps += 1
         if self.steps > self.case.time.max_steps:

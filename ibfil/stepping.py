@@ -30,13 +30,17 @@ class State(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A finished step: the new state, the nodes' velocities, the force the fluid felt, reactions, iterations."""
+    """A finished step: the new state, the nodes' velocities, the force the fluid felt, reactions, iterations.
+
+    ``response`` is the fluid's that it was solved with: what a fluid that remembers is told when the step is taken.
+    """
 
     state: State
     velocity: np.ndarray  # (n, m)
     force: np.ndarray  # (n, m), reactions included
     reaction: np.ndarray  # (n, m)
     iterations: int
+    response: Response
 
 
 class Rods(Protocol):
@@ -84,9 +88,11 @@ def _size(move: np.ndarray, length: float) -> float:
     return float(max(np.max(np.abs(move[:, :3])) / length, np.max(np.abs(move[:, 3:]), initial=0.0)))
 
 
-def _finish(rods: Rods, state: State, dt: float, y: np.ndarray, velocity, answer: Answer, count: int) -> Step:
+def _finish(
+    rods: Rods, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Answer, count: int, response
+) -> Step:
     new = State(state.time + dt, rods.move(state.shape, y), y, dt)
-    return Step(new, velocity, answer.force, answer.reaction, count)
+    return Step(new, velocity, answer.force, answer.reaction, count, response)
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,7 @@ class Explicit:
         target = np.zeros(force.shape)
         response = fluid.response(state.shape.r, state.shape.e3, state.time, dt)
         answer = response.forced(force, rods.held(state.time, state.time + dt), target)
-        return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 0)
+        return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 0, response)
 
 
 @dataclass(frozen=True)
@@ -121,7 +127,7 @@ class SemiImplicit:
         zero = np.zeros(force.shape)
         response = fluid.response(state.shape.r, state.shape.e3, after, dt)
         answer = response.implicit(force, matrix, rods.held(state.time, after), zero, zero)
-        return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 1)
+        return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 1, response)
 
 
 class _Equation(NamedTuple):
@@ -178,7 +184,7 @@ class Implicit:
         there = rods.move(state.shape, ahead) if w else state.shape
         equation = _Equation(
             rods,
-            fluid.response(there.r, there.e3, after, tau),
+            fluid.response(there.r, there.e3, after, tau, w),
             state.shape,
             after,
             target,
@@ -188,7 +194,7 @@ class Implicit:
             y, answer, count = self._newton(equation, np.zeros(target.shape), state.shape, None)
         except FAILURES:
             y, answer, count = self._newton(equation, ahead, there, self.stride)
-        return _finish(rods, state, dt, y, (y - target) / tau, answer, count)
+        return _finish(rods, state, dt, y, (y - target) / tau, answer, count, equation.response)
 
     def _newton(
         self, equation: _Equation, y: np.ndarray, shape: Geometry, stride: float | None

@@ -119,7 +119,7 @@ class Tabulated(Memoryless):
 class StokesByTable(Tabulated):
     """IB Stokes by the exact mobility table: a small dense solve with the true operator."""
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Dense:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Dense:
         """The mobility of nodes r (n, 3) with tangents e3 (n, 3)."""
         fluid = self.fluid
         return _Dense(fluid, self.matrix(fluid.nodes(r, e3), fluid.own), r, e3, time, tau)
@@ -132,7 +132,7 @@ class StokesByAverage(Tabulated):
         super().__init__(fluid)
         self._averaged = averaged.table(mobility.point_response(fluid.grid, fluid.viscosity), fluid.kernel)
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Dense:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Dense:
         """The averaged mobility of nodes r (n, 3)."""
         fluid, n = self.fluid, len(r)
         matrix = averaged.mobility(self._averaged, fluid.grid.cells, fluid.grid.coordinates(r), fluid.slip)
@@ -211,7 +211,7 @@ class StokesByFFT(Tabulated):
         super().__init__(fluid)
         self.solver = solver
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> _Fourier:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Fourier:
         """The FFT operator between nodes r (n, 3) with tangents e3 (n, 3)."""
         return _Fourier(self, r, e3, time, tau)
 

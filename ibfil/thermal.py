@@ -117,4 +117,4 @@ class Trapezoid:
         half = response.implicit(force + kicks, matrix, Held(index, 0.5 * value), zero, zero)
         y = 2 * half.move
         new = State(state.time + dt, rods.move(state.shape, y), y, dt)
-        return Step(new, y / dt, half.force - kicks, half.reaction, 1)
+        return Step(new, y / dt, half.force - kicks, half.reaction, 1, response)
