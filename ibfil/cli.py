@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from . import __version__
 from .errors import CaseError, Interrupted, RunFailed
+from .study_cli import add_studies
 from .threads import set_threads
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     vtk = add("vtk", _vtk, "write ParaView files: a .pvd collection of filaments and fields")
     vtk.add_argument("run", metavar="RUN.h5")
     vtk.add_argument("-o", dest="folder", metavar="DIR", help="the folder (default: the run's name)")
+    add_studies(add)
     verify = add("verify", _verify, "run shipped or given cases and hold their [expect] numbers against the result")
     verify.add_argument("cases", nargs="*", metavar="CASE")
     verify.add_argument("--quick", action="store_true", help="the quick form of each case")
