@@ -25,11 +25,13 @@ from .mechanics import Mechanics
 from .rods import Segmented, stack
 
 if TYPE_CHECKING:
+    from . import stokes
     from .case_filament import Filament
     from .case_schema import Case
     from .contact import Contact
     from .fluid import Fluid
     from .grid import Grid
+    from .immersed import Coupling
     from .kernels import Kernel
     from .laws import MomentLaw
     from .matched import Match
@@ -245,14 +247,14 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
         return rft.ResistiveForce(drag(case, stacked), stacked.mechanics.profile, flow(case)), "rft", None
     from . import immersed, stokes
     from .grid import Grid
-    from .pruned import PrunedSolve
 
     assert case.fluid.box is not None
     grid, eta = Grid(case.fluid.box, case.fluid.cells or cells_of_thickness(case)), case.fluid.viscosity
     slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, eta, stacked.spacing)
-    spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 else None
+    spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 and not stirs(case) else None
     number = np.float32 if case.fluid.precision == "single" else np.float64
-    made = immersed.Immersed(grid, kernel(case), eta, slip, spin, flow(case), stacked.nodes, number)
+    coupled = coupling(case, stacked)
+    made = immersed.Immersed(grid, kernel(case), eta, slip, spin, flow(case), stacked.nodes, number, coupled)
     seconds = method_seconds(case, stacked, grid)
     # The averaged table is an approximation: on request only.
     exact = [name for name in seconds if name != "averaged"]
@@ -262,9 +264,60 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     if method == "averaged":
         return stokes.StokesByAverage(made), method, grid
     kind = stokes.StokesByKrylov if method == "krylov" else stokes.StokesByFFT
-    whole = method == "fft" or (method == "krylov" and not fills_little(case, stacked, grid))
-    solver = (stokes.StokesSolve if whole else PrunedSolve)(grid, eta, case.compute.threads)
-    return kind(made, solver), method, grid
+    return kind(made, _solver(case, stacked, grid, method)), method, grid
+
+
+def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Solver:
+    """What evaluates velocities by FFT: of the whole grid, or where that is cheaper of the filaments' bounding box."""
+    eta, threads = case.fluid.viscosity, case.compute.threads
+    if stirs(case):
+        from .stirring import StirredSolve
+
+        return StirredSolve(grid, eta, threads)
+    if method == "fft" or (method == "krylov" and not fills_little(case, stacked, grid)):
+        from .stokes import StokesSolve
+
+        return StokesSolve(grid, eta, threads)
+    from .pruned import PrunedSolve
+
+    return PrunedSolve(grid, eta, threads)
+
+
+def stirs(case: Case) -> bool:
+    """Whether twist torques go onto the grid."""
+    twisting = any(f.twisting is not None for f in case.filaments.values())
+    return case.fluid.model != "rft" and case.fluid.rotation == "grid" and twisting
+
+
+def coupling(case: Case, stacked: Stacked) -> Coupling:
+    """What of a node goes through the grid."""
+    if not stirs(case):
+        from .mobility import TRANSLATION
+
+        return TRANSLATION
+    from .stirring import Stirring, own_spin
+
+    n, volume = len(stacked.s), stacked.mechanics.mesh.volume
+    widest = twist_radius(case)
+    radius, twists = np.full(n, widest), np.zeros(n)
+    for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
+        twists[where] = filament.twisting is not None
+        if filament.radius is not None:
+            radius[where] = alone(filament.radius, stacked.s[where])
+    spin = own_spin(radius, widest, case.fluid.viscosity, volume)
+    # Where a filament does not twist its turn is held; any positive number will do for the row.
+    return Stirring(np.where(twists > 0, spin, 1.0), twists)
+
+
+def spacing(case: Case) -> float:
+    """The grid's h. Raises CaseError where ``thickness`` has none."""
+    assert case.fluid.box is not None
+    return case.fluid.box[0] / (case.fluid.cells or cells_of_thickness(case))[0]
+
+
+def twist_radius(case: Case) -> float:
+    """The radius of the cylinder that a line of torques on the case's grid spins like."""
+    return kernel(case).twist_radius * spacing(case)
 
 
 def _box(case: Case, stacked: Stacked, grid: Grid) -> list[int]:
@@ -279,7 +332,8 @@ def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str,
     """Estimated seconds of a step by each method that the fluid has, from counts."""
     if grid is None:
         return costs.seconds_a_step(case, len(stacked.s))
-    return costs.seconds_a_step(case, len(stacked.s), grid.cells.tolist(), _box(case, stacked, grid))
+    cells, sizes = grid.cells.tolist(), _box(case, stacked, grid)
+    return costs.seconds_a_step(case, len(stacked.s), cells, sizes, stirs(case))
 
 
 def fills_little(case: Case, stacked: Stacked, grid: Grid) -> bool:

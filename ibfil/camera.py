@@ -112,5 +112,6 @@ class Camera:
             fluid = self.case.fluid
             self._fields = GridFields(self.grid, fluid.viscosity, assemble.flow(self.case), self.case.compute.threads)
         base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
-        force = np.ascontiguousarray(now.force[:, :3])
-        return self._fields.evaluate(base, weights, force, now.state.time, fields)
+        coupling = assemble.coupling(self.case, self._rods)
+        pushes = coupling.lift(coupling.axes(now.state.shape.e3), now.force)
+        return self._fields.evaluate(base, weights, pushes, now.state.time, fields)

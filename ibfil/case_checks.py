@@ -83,6 +83,9 @@ def _fluid(case: Scene) -> Iterator[Fault]:
     twisted = any(filament.twisting is not None for filament in case.filaments.values())
     if fluid.model != "rft" and "rotation" in fluid.model_fields_set and not twisted:
         yield Fault("fluid.rotation", shown(fluid.rotation), "only where a filament has twisting", ("filament",))
+    if fluid.model != "rft" and fluid.rotation == "grid" and fluid.method in ("pruned", "averaged"):
+        found = f'{shown(fluid.method)} with rotation = "grid", whose torques it does not know'
+        yield Fault("fluid.method", found, '"auto", "table", "fft" or "krylov"', ("fluid.rotation", "fluid.model"))
 
 
 def _periodic(fluid: Fluid) -> bool:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _NODE = 2.0e-6  # seconds a node for geometry, force, stiffness and a banded solve
 _SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
 _PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
+_COMPONENTS = 2.5  # the same of a table with torques, of one without
 _AVERAGED = 0.25  # a pair of the averaged table, of one of the exact
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
@@ -42,16 +43,23 @@ def pruned_evaluation(cells: Sequence[int], sizes: Sequence[int]) -> float:
 
 
 def seconds_a_step(
-    case: Case, nodes: int, cells: Sequence[int] | None = None, sizes: Sequence[int] | None = None
+    case: Case,
+    nodes: int,
+    cells: Sequence[int] | None = None,
+    sizes: Sequence[int] | None = None,
+    stirs: bool = False,
 ) -> dict[str, float]:
     """Seconds of one step by each method: "rft", or on ``cells`` (3,) "table", "averaged", "fft", "pruned", "krylov".
 
-    ``sizes`` (3,) are the extents of the filaments' bounding box in cells. The table is out where it does not fit.
+    ``sizes`` (3,) are the extents of the filaments' bounding box in cells, ``stirs`` whether torques go onto the grid
+    too. The table is out where it does not fit.
     """
     rounds = _ROUNDS[case.time.scheme]
     local = rounds * nodes * _NODE
     if cells is None or sizes is None:
         return {"rft": local}
+    if stirs:
+        return _with_torques(rounds, nodes, cells)
     build = 0.5 * nodes**2 * _PAIR
     full = full_evaluation(cells) + nodes * _SPREAD
     pruned = pruned_evaluation(cells, sizes) + nodes * _SPREAD
@@ -69,6 +77,19 @@ def seconds_a_step(
     }
 
 
-def dense_bytes(nodes: int) -> float:
-    """Bytes of the dense matrices of the table and its solve."""
-    return 4 * 8.0 * (3.0 * nodes) ** 2
+def _with_torques(rounds: int, nodes: int, cells: Sequence[int]) -> dict[str, float]:
+    """The same with four unknowns a node, fifteen components a pair and twice the transforms."""
+    local, build = rounds * nodes * _NODE, 0.5 * nodes**2 * _PAIR * _COMPONENTS
+    full = 2 * (full_evaluation(cells) + nodes * _SPREAD)
+    exact = build + rounds * 4.0 * (4.0 * nodes) ** 3 * _FLOP
+    fits = dense_bytes(nodes, 4) < _LARGEST
+    return {
+        "table": local + exact if fits else np.inf,
+        "fft": local + exact + 4 * rounds * full if fits else np.inf,
+        "krylov": local + (2 + _PRODUCTS) * rounds * full,
+    }
+
+
+def dense_bytes(nodes: int, parts: int = 3) -> float:
+    """Bytes of the dense matrices of the table and its solve, with ``parts`` unknowns a node."""
+    return 4 * 8.0 * (float(parts) * nodes) ** 2

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .grid import Grid, project, spread
+from .stirring import curl, half_curl
 from .transforms import VectorTransform
 
 Flow = Callable[[np.ndarray, float], np.ndarray]
@@ -25,18 +26,20 @@ class GridFields:
         self._transform = VectorTransform((nx, ny, nz), threads, "FFTW_ESTIMATE")
         (kx, ky, kz), self._squares = grid.wave_numbers()
         self._k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
+        self._axes = (kx, ky, kz)
         self._waves = (kx, ky, np.repeat(kz, 2))
 
     def evaluate(
         self, base: np.ndarray, weights: np.ndarray, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray]:
-        """The fields in ``names`` that nodal forces (n, 3) with the stencils (base, weights) drive."""
-        t, h = self._transform, self.grid.spacing
-        t.real[:] = 0.0
-        spread(base, weights, force, t.real)
-        t.forward()
+        """The fields in ``names`` that nodal forces (n, 3), or forces and torques (n, 6), drive.
+
+        The nodes have the stencils (base, weights); torques act as half a curl (stirring.py).
+        """
         # Each field is transformed in the same room, so what they are made of is kept elsewhere.
-        modes = t.modes / (t.size * h**3)
+        modes = self._modes(base, weights, force[:, :3])
+        if force.shape[1] == 6:
+            half_curl(self._modes(base, weights, force[:, 3:]), *self._axes, modes)
         out = {}
         if "pressure" in names:
             out["pressure"] = self._pressure(modes)
@@ -45,9 +48,17 @@ class GridFields:
         if "velocity" in names:
             out["velocity"] = self._real(modes, self._background(time))
         if "vorticity" in names:
-            curl = np.stack([1j * (self._k[a] * modes[b] - self._k[b] * modes[a]) for a, b in ((1, 2), (2, 0), (0, 1))])
-            out["vorticity"] = self._real(curl, self._background_curl(time))
+            spin = np.zeros_like(modes)
+            half_curl(modes, *self._axes, spin)
+            out["vorticity"] = self._real(2 * spin, self._background_curl(time))
         return out
+
+    def _modes(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The modes of the spread forces (n, 3), as a density."""
+        t = self._transform
+        t.real[:] = 0.0
+        spread(base, weights, force, t.real)
+        return t.forward() / (t.size * self.grid.spacing**3)
 
     def _real(self, modes: np.ndarray, background: np.ndarray | None) -> np.ndarray:
         self._transform.modes[:] = modes
@@ -74,15 +85,6 @@ class GridFields:
         return self.flow(self._points(), time).reshape(*self.grid.cells, 3)
 
     def _background_curl(self, time: float) -> np.ndarray | None:
-        """Curl of the background flow by central differences over a thousandth of a cell."""
         if self.flow is None:
             return None
-        points, d = self._points(), 1e-3 * self.grid.spacing
-        slopes = []
-        for axis in range(3):
-            step = np.zeros(3)
-            step[axis] = d
-            slopes.append((self.flow(points + step, time) - self.flow(points - step, time)) / (2 * d))
-        x, y, z = slopes
-        curl = np.stack([y[:, 2] - z[:, 1], z[:, 0] - x[:, 2], x[:, 1] - y[:, 0]], axis=1)
-        return curl.reshape(*self.grid.cells, 3)
+        return curl(self.flow, self._points(), time, self.grid.spacing).reshape(*self.grid.cells, 3)

@@ -38,6 +38,8 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
 
         out["ds/h"] = length / (filament.nodes - 1) / grid.spacing
         out["a/L"] = KERNELS[case.fluid.kernel].line_radius * grid.spacing / length
+        if filament.twisting is not None and case.fluid.rotation == "grid":
+            out["a/L when spun"] = _spun(filament, assemble.twist_radius(case)) / length
         wave = _wave(filament)
         if wave:
             out["wavelength/h"] = 2 * np.pi / wave / grid.spacing
@@ -48,6 +50,13 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
         out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
         out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
     return out
+
+
+def _spun(filament, widest: float) -> float:
+    """The radius a filament spins as on a grid whose twist radius is ``widest``: no more than that."""
+    if filament.radius is None:
+        return widest
+    return min(widest, float(np.max(filament.radius.bind("s", "t")(0.5 * filament.length, 0.0))))
 
 
 def _wave(filament) -> float:
@@ -88,6 +97,7 @@ def warnings(simulation: Simulation) -> list[str]:
                 f"{key}: {found['wavelength/h']:.3g} cells a wavelength: below {CELLS_A_WAVE} the rod is as "
                 "thick as its waves; take more fluid.cells"
             )
+        out += _of_spin(simulation, key, filament)
         if simulation.grid is not None and filament.length > min(simulation.grid.box):
             out.append(
                 f"{key}: length {filament.length:g} is more than the box ({min(simulation.grid.box):g}): the filament "
@@ -103,6 +113,21 @@ def warnings(simulation: Simulation) -> list[str]:
         where = simulation.nodes(name)
         out += shapes.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
     return out + _of_run(simulation)
+
+
+def _of_spin(simulation: Simulation, key: str, filament) -> list[str]:
+    """A rod that is thicker than what the grid can make spin."""
+    case = simulation.case
+    if not assemble.stirs(case) or filament.twisting is None or filament.radius is None:
+        return []
+    widest = assemble.twist_radius(case)
+    largest = float(np.max(filament.radius.bind("s", "t")(np.linspace(0.0, filament.length, 11), 0.0)))
+    if largest <= widest * (1 + 1e-9):
+        return []
+    return [
+        f"{key}.radius: {largest:.4g} is above {widest:.4g}, the radius that a rod on this grid has when it spins: "
+        'it spins as one of that; take fewer fluid.cells, a wider fluid.kernel, or fluid.rotation = "local"'
+    ]
 
 
 def _of_noise(simulation: Simulation) -> list[str]:

@@ -51,27 +51,30 @@ class Coupling(Protocol):
     def own(self, slip: np.ndarray) -> np.ndarray:
         """What each node moves by its own force or torque beyond the grid's answer, (n, c), given the slip (n,)."""
 
-    def lift(self, e3: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def axes(self, e3: np.ndarray) -> np.ndarray:
+        """What nodes with tangents e3 (n, 3) spin about, (n, 3); zero where they do not."""
+
+    def lift(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The vectors (n, 3 v) that go onto the grid, of forces (n, m), m at least c."""
 
-    def drop(self, e3: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    def drop(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """The motions (n, c) from the vectors (n, 3 v) that come off the grid."""
 
-    def carried(self, flow: Flow, r: np.ndarray, e3: np.ndarray, time: float) -> np.ndarray:
-        """The motions (n, c) of nodes that a background flow carries."""
+    def carried(self, flow: Flow, r: np.ndarray, axes: np.ndarray, time: float, h: float) -> np.ndarray:
+        """The motions (n, c) of nodes that a background flow carries; h is the grid's spacing."""
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Where nodes are on the grid: first index (n, 3), weights (n, 3, P), and the tangents (n, 3)."""
+    """Where nodes are on the grid: first index (n, 3), weights (n, 3, P), and what they spin about (n, 3)."""
 
     base: np.ndarray
     weights: np.ndarray
-    e3: np.ndarray
+    axes: np.ndarray
 
     def __getitem__(self, part: slice) -> Nodes:
         """Some of them."""
-        return Nodes(self.base[part], self.weights[part], self.e3[part])
+        return Nodes(self.base[part], self.weights[part], self.axes[part])
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ class Immersed:
 
     def nodes(self, r: np.ndarray, e3: np.ndarray) -> Nodes:
         """The nodes r (n, 3) with tangents e3 (n, 3) on the grid."""
-        return Nodes(*self.stencil(r), np.ascontiguousarray(e3))
+        return Nodes(*self.stencil(r), self.coupling.axes(e3))
 
 
 def slip_mobility(fraction: float, kernel: Kernel, grid: Grid, viscosity: float, ds: np.ndarray) -> np.ndarray:
@@ -127,7 +130,9 @@ class ImmersedResponse(ABC):
     def __init__(self, fluid: Immersed, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> None:
         self.fluid, self.tau, self.parts = fluid, tau, fluid.coupling.parts
         self.nodes = fluid.nodes(r, e3)
-        self.flow = None if fluid.flow is None else fluid.coupling.carried(fluid.flow, r, e3, time)
+        self.flow = None
+        if fluid.flow is not None:
+            self.flow = fluid.coupling.carried(fluid.flow, r, self.nodes.axes, time, fluid.grid.spacing)
 
     @abstractmethod
     def apply(self, force: np.ndarray) -> np.ndarray:

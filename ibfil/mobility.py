@@ -170,16 +170,20 @@ class Translation:
         """The slip, in each direction."""
         return np.repeat(slip[:, None], 3, axis=1)
 
-    def lift(self, e3: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def axes(self, e3: np.ndarray) -> np.ndarray:
+        """The tangents; no use is made of them."""
+        return np.ascontiguousarray(e3)
+
+    def lift(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The forces."""
         return np.ascontiguousarray(force[:, :3])
 
-    def drop(self, e3: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    def drop(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """The velocities."""
         return motion
 
     def carried(
-        self, flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, e3: np.ndarray, time: float
+        self, flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, axes: np.ndarray, time: float, h: float
     ) -> np.ndarray:
         """The flow's velocity (n, 3)."""
         return flow(r, time)

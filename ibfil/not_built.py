@@ -28,11 +28,6 @@ def _fluid(key: str, asks: Callable[[Fluid], bool]) -> Keys:
     return _scene(f"fluid.{key}", lambda case: asks(case.fluid))
 
 
-def _grid(key: str, asks: Callable[[Fluid], bool]) -> Keys:
-    """A key of the grid: idle under rft, and then it asks for nothing."""
-    return _fluid(key, lambda fluid: fluid.model != "rft" and asks(fluid))
-
-
 def _filaments(key: str, asks: Callable[[Filament], bool]) -> Keys:
     return lambda case: [f"filament.{name}.{key}" for name, f in case.filaments.items() if asks(f)]
 
@@ -54,7 +49,6 @@ NOT_BUILT: list[Row] = [
         "the other kinds",
     ),
     Row(_fluid("model", lambda f: f.model == "navier-stokes"), "the Navier-Stokes fluid", '"rft" or "stokes"'),
-    Row(_grid("rotation", lambda f: f.rotation != "local"), "torque coupling to the grid", '"local"'),
 ]
 
 

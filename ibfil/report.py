@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import costs
+from . import assemble, costs
 from .case import idle_keys
 from .case_schema import Matched
 from .groups import groups, warnings
@@ -72,7 +72,8 @@ def modelled(case: Case) -> list[str]:
         terms += [word for key, word in _LOADS.items() if getattr(f.loads, key, None) is not None]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     if case.fluid.flow is not None:
-        out.append("a background flow, which moves the nodes and does not spin them")
+        spins = "and spins them by half its vorticity" if assemble.stirs(case) else "and does not spin them"
+        out.append(f"a background flow, which moves the nodes {spins}")
     if case.contact is not None:
         out.append(_contact(case.contact))
     fluid = case.fluid
@@ -86,7 +87,9 @@ def modelled(case: Case) -> list[str]:
     out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
     if fluid.slip:
         out.append(f"slip mobility of {fluid.slip:g} of a point's own, against locking")
-    if any(f.twisting is not None for f in case.filaments.values()):
+    if assemble.stirs(case):
+        out.append("twist torques stir the grid as half a curl, rods spin with half its vorticity (rotation = grid)")
+    elif any(f.twisting is not None for f in case.filaments.values()):
         out.append("spin against the rod's own drag (rotation = local)")
     return out
 
@@ -114,7 +117,7 @@ def absent(case: Case) -> list[str]:
         out.append("twist: no twist unknowns; e1 is carried along")
     if case.fluid.model == "rft":
         out.append("hydrodynamic interaction; grid and FFT plans")
-    else:
+    elif not assemble.stirs(case):
         out.append("torque coupling of the spin to the grid")
     if case.output.grid_every is None:
         out.append("field output")
@@ -145,19 +148,19 @@ def memory(simulation: Simulation) -> dict[str, float]:
     from .kernels import KERNELS
 
     cells = simulation.grid.cells
-    rim = KERNELS[case.fluid.kernel].points - 1
+    rim, parts = KERNELS[case.fluid.kernel].points - 1, 4 if assemble.stirs(case) else 3
     number = 4.0 if case.fluid.precision == "single" else 8.0
-    out["mobility table"] = number * 6 * float(np.prod(cells // 2 + 1 + 2 * rim))
+    out["mobility table"] = number * (15 if parts == 4 else 6) * float(np.prod(cells // 2 + 1 + 2 * rim))
     if simulation.method == "averaged":
         out["averaged table"] = 8.0 * 6 * float(np.prod(2 * (cells // 2 + 5)))
     blocks = [n] if simulation.method != "krylov" else [f.nodes for f in case.filaments.values()]
     if simulation.method == "krylov":
-        out["preconditioner"] = sum(8.0 * (3 * k) ** 2 for k in blocks) + 2 * out["band matrix"]
-        out["Krylov vectors"] = 60 * 8.0 * 3 * n
+        out["preconditioner"] = sum(8.0 * (parts * k) ** 2 for k in blocks) + 2 * out["band matrix"]
+        out["Krylov vectors"] = 60 * 8.0 * parts * n
     else:
-        out["dense matrices"] = costs.dense_bytes(n)
+        out["dense matrices"] = costs.dense_bytes(n, parts)
     if simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
-        out["fields and their transforms"] = 2 * 3 * 8.0 * float(np.prod(cells))
+        out["fields and their transforms"] = (parts - 2) * 2 * 3 * 8.0 * float(np.prod(cells))
     return out
 
 
@@ -176,7 +179,12 @@ def _costs(simulation: Simulation) -> list[str]:
     unknowns = simulation.mechanics.unknowns
     lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
     if simulation.grid is not None:
-        lines.append(f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {simulation.grid.spacing:.4g}")
+        h, kernel = simulation.grid.spacing, assemble.kernel(case)
+        lines.append(f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {h:.4g}")
+        lines.append(
+            f"a rod on it is as thick as its kernel: radius {kernel.line_radius * h:.4g} when dragged, "
+            f"{kernel.twist_radius * h:.4g} when spun by the grid; no one radius of RFT has both"
+        )
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")

@@ -88,7 +88,7 @@ class _Dense(ImmersedResponse):
         return self.matrix[:, index]
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
-        stiffness = statement.frozen().matrix(slice(0, len(self.nodes.e3)))
+        stiffness = statement.frozen().matrix(slice(0, len(self.nodes.axes)))
         return np.linalg.solve(dense_system(self.matrix, stiffness, self.tau, statement.index), right)
 
 
@@ -105,7 +105,8 @@ class Tabulated(Memoryless):
     ) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of forces (n, m) at r (n, 3)."""
         fluid, k, n, c = self.fluid, len(points), len(r), self.fluid.coupling.parts
-        nodes = fluid.nodes(np.concatenate([points, r]), np.concatenate([np.zeros_like(points), e3]))
+        axes = np.concatenate([np.zeros_like(points), fluid.coupling.axes(e3)])
+        nodes = Nodes(*fluid.stencil(np.concatenate([points, r])), axes)
         rows, columns = np.arange(k), np.arange(k, k + n)
         block = fluid.coupling.block(self._table, fluid.grid.cells, nodes, np.zeros((k + n, c)), rows, columns)
         u = (block @ force[:, :c].ravel()).reshape(k, c)[:, :3]
@@ -163,12 +164,12 @@ class _Fourier(ImmersedResponse):
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         f, nodes, coupling = force.reshape(-1, self.parts), self.nodes, self.fluid.coupling
-        moved = self.owner.solver.velocity(nodes.base, nodes.weights, coupling.lift(nodes.e3, f))
-        return (coupling.drop(nodes.e3, moved) + self.fluid.own * f).ravel()
+        moved = self.owner.solver.velocity(nodes.base, nodes.weights, coupling.lift(nodes.axes, f))
+        return (coupling.drop(nodes.axes, moved) + self.fluid.own * f).ravel()
 
     def columns(self, index: np.ndarray) -> np.ndarray:
         nodes, parts = index // self.parts, index % self.parts
-        block = self.owner.block(self.nodes, np.arange(len(self.nodes.e3)), np.unique(nodes))
+        block = self.owner.block(self.nodes, np.arange(len(self.nodes.axes)), np.unique(nodes))
         return block[:, self.parts * np.searchsorted(np.unique(nodes), nodes) + parts]
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
@@ -223,7 +224,7 @@ class StokesByFFT(Tabulated):
     def preconditioner(self, response: _Fourier, statement: Reduced) -> _Blocks:
         """The exact matrix of all nodes, factored."""
         nodes = response.nodes
-        return self._factor(nodes, response.tau, statement.frozen(), (slice(0, len(nodes.e3)),))
+        return self._factor(nodes, response.tau, statement.frozen(), (slice(0, len(nodes.axes)),))
 
     def took(self, count: int) -> None:
         """Told how many products a solve took."""
@@ -291,6 +292,6 @@ class StokesByKrylov(StokesByFFT):
         """Makes the factors of ``memory`` again."""
         arrays = {k: np.asarray(v) for k, v in memory.items()}
         rods = RodStiffness(arrays["band"], arrays["held"].astype(np.int64), arrays.get("turns"), arrays.get("still"))
-        nodes = Nodes(arrays["base"].astype(np.int64), arrays["weights"], arrays["e3"])
+        nodes = Nodes(arrays["base"].astype(np.int64), arrays["weights"], arrays["axes"])
         self._keep(nodes, float(arrays["tau"]), rods)
         self._tired, self._first = bool(arrays["tired"]), int(arrays["first"])
