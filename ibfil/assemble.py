@@ -263,8 +263,10 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
         return stokes.StokesByTable(made), method, grid
     if method == "averaged":
         return stokes.StokesByAverage(made), method, grid
-    kind = stokes.StokesByKrylov if method == "krylov" else stokes.StokesByFFT
-    return kind(made, _solver(case, stacked, grid, method)), method, grid
+    solver = _solver(case, stacked, grid, method)
+    if method == "krylov":
+        return stokes.StokesByKrylov(made, solver, _worth(case, stacked, grid)), method, grid
+    return stokes.StokesByFFT(made, solver), method, grid
 
 
 def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Solver:
@@ -330,10 +332,18 @@ def _box(case: Case, stacked: Stacked, grid: Grid) -> list[int]:
 
 def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str, float]:
     """Estimated seconds of a step by each method that the fluid has, from counts."""
+    rods = [where.stop - where.start for where in stacked.nodes]
     if grid is None:
-        return costs.seconds_a_step(case, len(stacked.s))
+        return costs.seconds_a_step(case, rods)
     cells, sizes = grid.cells.tolist(), _box(case, stacked, grid)
-    return costs.seconds_a_step(case, len(stacked.s), cells, sizes, stirs(case))
+    return costs.seconds_a_step(case, rods, cells, sizes, stirs(case))
+
+
+def _worth(case: Case, stacked: Stacked, grid: Grid) -> float:
+    """What factoring the rods' own systems costs, in velocity evaluations."""
+    evaluation = costs.evaluation(grid.cells.tolist(), _box(case, stacked, grid), len(stacked.s))
+    parts = 4 if stirs(case) else 3
+    return sum(costs.factored(where.stop - where.start, parts) for where in stacked.nodes) / evaluation
 
 
 def fills_little(case: Case, stacked: Stacked, grid: Grid) -> bool:

@@ -22,7 +22,7 @@ _AVERAGED = 0.25  # a pair of the averaged table, of one of the exact
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
 _ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
-_PRODUCTS = 6  # of GMRES with a kept preconditioner, an iteration of Newton
+_PRODUCTS = 11  # of GMRES with a preconditioner rod by rod, an iteration of Newton
 _LARGEST = 2.0**30  # bytes that the table's dense matrices may take before the table is out of the question
 
 
@@ -42,51 +42,68 @@ def pruned_evaluation(cells: Sequence[int], sizes: Sequence[int]) -> float:
     return 6 * float(lines + nc * nb * na * np.log2(nc)) * _MODE
 
 
+def evaluation(cells: Sequence[int], sizes: Sequence[int], nodes: int) -> float:
+    """Seconds of one velocity evaluation of ``nodes`` by the cheaper transforms."""
+    return min(full_evaluation(cells), pruned_evaluation(cells, sizes)) + nodes * _SPREAD
+
+
+def solved(nodes: int, parts: int = 3) -> float:
+    """Seconds of one dense system with ``parts`` unknowns a node: M K with K in its band, and LU factors."""
+    n = float(parts) * nodes
+    return (0.7 * n + 150.0) * n**2 * _FLOP
+
+
+def factored(nodes: int, parts: int = 3) -> float:
+    """Seconds of a rod's own exact matrix and its factors."""
+    return 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1.0) + solved(nodes, parts)
+
+
 def seconds_a_step(
     case: Case,
-    nodes: int,
+    rods: Sequence[int],
     cells: Sequence[int] | None = None,
     sizes: Sequence[int] | None = None,
     stirs: bool = False,
 ) -> dict[str, float]:
     """Seconds of one step by each method: "rft", or on ``cells`` (3,) "table", "averaged", "fft", "pruned", "krylov".
 
-    ``sizes`` (3,) are the extents of the filaments' bounding box in cells, ``stirs`` whether torques go onto the grid
-    too. The table is out where it does not fit.
+    ``rods`` are the nodes of each filament, ``sizes`` (3,) the extents of their bounding box in cells, ``stirs``
+    whether torques go onto the grid too. The table is out where it does not fit.
     """
-    rounds = _ROUNDS[case.time.scheme]
+    rounds, nodes = _ROUNDS[case.time.scheme], sum(rods)
     local = rounds * nodes * _NODE
     if cells is None or sizes is None:
         return {"rft": local}
     if stirs:
-        return _with_torques(rounds, nodes, cells)
+        return _with_torques(rounds, rods, cells)
     build = 0.5 * nodes**2 * _PAIR
     full = full_evaluation(cells) + nodes * _SPREAD
     pruned = pruned_evaluation(cells, sizes) + nodes * _SPREAD
     if case.time.scheme == "explicit":
         averaged = local + build * _AVERAGED
         return {"table": local + build, "averaged": averaged, "fft": local + full, "pruned": local + pruned}
-    exact = build + rounds * 4.0 * (3.0 * nodes) ** 3 * _FLOP
+    exact = build + rounds * solved(nodes)
     fits = dense_bytes(nodes) < _LARGEST
     return {
         "table": local + exact if fits else np.inf,
         "averaged": local + exact + (_AVERAGED - 1) * build if fits else np.inf,
         "fft": local + exact + 4 * rounds * full if fits else np.inf,
         "pruned": local + exact + 4 * rounds * pruned if fits else np.inf,
-        "krylov": local + (2 + _PRODUCTS) * rounds * min(full, pruned),
+        "krylov": local + _PRODUCTS * rounds * min(full, pruned) + sum(map(factored, rods)),
     }
 
 
-def _with_torques(rounds: int, nodes: int, cells: Sequence[int]) -> dict[str, float]:
+def _with_torques(rounds: int, rods: Sequence[int], cells: Sequence[int]) -> dict[str, float]:
     """The same with four unknowns a node, fifteen components a pair and twice the transforms."""
+    nodes = sum(rods)
     local, build = rounds * nodes * _NODE, 0.5 * nodes**2 * _PAIR * _COMPONENTS
     full = 2 * (full_evaluation(cells) + nodes * _SPREAD)
-    exact = build + rounds * 4.0 * (4.0 * nodes) ** 3 * _FLOP
+    exact = build + rounds * solved(nodes, 4)
     fits = dense_bytes(nodes, 4) < _LARGEST
     return {
         "table": local + exact if fits else np.inf,
         "fft": local + exact + 4 * rounds * full if fits else np.inf,
-        "krylov": local + (2 + _PRODUCTS) * rounds * full,
+        "krylov": local + _PRODUCTS * rounds * full + sum(factored(k, 4) for k in rods),
     }
 
 

@@ -153,8 +153,8 @@ def memory(simulation: Simulation) -> dict[str, float]:
     out["mobility table"] = number * (15 if parts == 4 else 6) * float(np.prod(cells // 2 + 1 + 2 * rim))
     if simulation.method == "averaged":
         out["averaged table"] = 8.0 * 6 * float(np.prod(2 * (cells // 2 + 5)))
-    blocks = [n] if simulation.method != "krylov" else [f.nodes for f in case.filaments.values()]
     if simulation.method == "krylov":
+        blocks = [len(f.position) for f in simulation.frame().filaments.values()]
         out["preconditioner"] = sum(8.0 * (parts * k) ** 2 for k in blocks) + 2 * out["band matrix"]
         out["Krylov vectors"] = 60 * 8.0 * parts * n
     else:

@@ -12,19 +12,17 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
-from scipy.sparse.linalg import LinearOperator, gmres
 
-from . import averaged, mobility
+from . import averaged, krylov, mobility
 from .fluid import Memoryless
 from .grid import Grid, interpolate, project, spread
 from .immersed import Immersed, ImmersedResponse, Nodes
 from .transforms import VectorTransform
 from .turns import Reduced, RodStiffness
 
-_EXACT = 1e-11  # relative residual of GMRES where its preconditioner is the operator itself
+_EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself
 _LOOSE = 1e-6  # and where it is not: less than Newton gains in an iteration by the time it stops
-_PATIENCE = 1.5  # times the products of its first solve, and a few, that a kept preconditioner may cost
+_MOST = 5 * 60  # products of a solve, before it is given up
 
 
 class Solver(Protocol):
@@ -63,15 +61,6 @@ class StokesSolve:
         return interpolate(base, weights, self.field(base, weights, force))
 
 
-def dense_system(matrix: np.ndarray, stiffness: np.ndarray, tau: float, index: np.ndarray) -> np.ndarray:
-    """1 - tau M K with the columns of held unknowns replaced by those of -tau M."""
-    system = matrix @ stiffness
-    system *= -tau
-    system.ravel()[:: len(system) + 1] += 1.0
-    system[:, index] = -tau * matrix[:, index]
-    return system
-
-
 class _Dense(ImmersedResponse):
     """A dense mobility matrix (c n, c n), exact or averaged."""
 
@@ -89,7 +78,7 @@ class _Dense(ImmersedResponse):
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         stiffness = statement.frozen().matrix(slice(0, len(self.nodes.axes)))
-        return np.linalg.solve(dense_system(self.matrix, stiffness, self.tau, statement.index), right)
+        return np.linalg.solve(krylov.dense_system(self.matrix, stiffness, self.tau, statement.index), right)
 
 
 class Tabulated(Memoryless):
@@ -140,27 +129,12 @@ class StokesByAverage(Tabulated):
         return _Dense(fluid, matrix.reshape(3 * n, 3 * n), r, e3, time, tau)
 
 
-class _Blocks(NamedTuple):
-    """A preconditioner: LU factors of 1 - tau M K for each range of nodes, ``parts`` unknowns a node."""
-
-    parts: int
-    factors: list[tuple[slice, tuple[np.ndarray, np.ndarray]]]
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """The approximate x (c n,)."""
-        out = np.empty_like(right)
-        for rod, factors in self.factors:
-            at = slice(self.parts * rod.start, self.parts * rod.stop)
-            out[at] = lu_solve(factors, right[at], check_finite=False)
-        return out
-
-
 class _Fourier(ImmersedResponse):
     """FFT velocities; implicit steps by GMRES on them."""
 
     def __init__(self, owner: StokesByFFT, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> None:
         super().__init__(owner.fluid, r, e3, time, tau)
-        self.owner = owner
+        self.owner, self.solves = owner, 0
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         f, nodes, coupling = force.reshape(-1, self.parts), self.nodes, self.fluid.coupling
@@ -173,40 +147,18 @@ class _Fourier(ImmersedResponse):
         return block[:, self.parts * np.searchsorted(np.unique(nodes), nodes) + parts]
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
-        blocks = self.owner.preconditioner(self, statement)
-        x, count = self._gmres(statement, right, blocks)
-        self.owner.took(count)
-        return x
-
-    def _gmres(self, statement: Reduced, right: np.ndarray, blocks: _Blocks) -> tuple[np.ndarray, int]:
-        free, index, count = statement.free, statement.index, 0
+        free, index = statement.free, statement.index
 
         def product(x: np.ndarray) -> np.ndarray:
-            nonlocal count
-            count += 1
             force = statement.times(free * x)
             force[index] += x[index]
             return free * x - self.tau * self.apply(force)
 
-        shape = (right.size, right.size)
-        x, failed = gmres(
-            LinearOperator(shape, matvec=product, dtype=float),
-            right,
-            rtol=self.owner.residual,
-            atol=0.0,
-            restart=60,
-            maxiter=5,
-            M=LinearOperator(shape, matvec=blocks.solve, dtype=float),
-        )
-        if failed:
-            raise np.linalg.LinAlgError(f"GMRES did not reach its residual in {count} products with the FFT operator")
-        return x, count
+        return self.owner.solve(self, statement, product, right)
 
 
 class StokesByFFT(Tabulated):
     """IB Stokes by FFT; GMRES is preconditioned by the exact matrix of all nodes and so needs an iteration or two."""
-
-    residual = _EXACT
 
     def __init__(self, fluid: Immersed, solver: Solver) -> None:
         super().__init__(fluid)
@@ -221,28 +173,31 @@ class StokesByFFT(Tabulated):
         fluid = self.fluid
         return fluid.coupling.block(self._table, fluid.grid.cells, nodes, fluid.own, rows, columns)
 
-    def preconditioner(self, response: _Fourier, statement: Reduced) -> _Blocks:
-        """The exact matrix of all nodes, factored."""
+    def solve(self, response: _Fourier, statement: Reduced, product: krylov.Product, right: np.ndarray) -> np.ndarray:
+        """x with product(x) = right, preconditioned by the exact matrix of all nodes."""
         nodes = response.nodes
-        return self._factor(nodes, response.tau, statement.frozen(), (slice(0, len(nodes.axes)),))
+        blocks = self._factored(nodes, response.tau, statement.frozen(), (slice(0, len(nodes.axes)),))
+        return _checked(krylov.solve(product, right, blocks, _EXACT, _MOST))
 
-    def took(self, count: int) -> None:
-        """Told how many products a solve took."""
-
-    def _factor(self, nodes: Nodes, tau: float, rods: RodStiffness, ranges: tuple[slice, ...]) -> _Blocks:
-        factors, c = [], self.fluid.coupling.parts
+    def _factored(self, nodes: Nodes, tau: float, rods: RodStiffness, ranges: tuple[slice, ...]) -> krylov.Blocks:
+        parts, c = [], self.fluid.coupling.parts
         for rod in ranges:
             matrix = self.matrix(nodes[rod], self.fluid.own[rod])
-            inside = (rods.held >= c * rod.start) & (rods.held < c * rod.stop)
-            system = dense_system(matrix, rods.matrix(rod), tau, rods.held[inside] - c * rod.start)
-            factors.append((rod, lu_factor(system, overwrite_a=True, check_finite=False)))
-        return _Blocks(c, factors)
+            at = slice(c * rod.start, c * rod.stop)
+            held = rods.held[(rods.held >= at.start) & (rods.held < at.stop)] - at.start
+            parts.append((at, krylov.dense_system(matrix, rods.matrix(rod), tau, held)))
+        return krylov.factored(parts, rods.held)
 
 
-class _Kept(NamedTuple):
-    """A preconditioner that is kept, and all it was made from."""
+def _checked(solution: krylov.Solution) -> np.ndarray:
+    if not solution.found:
+        raise np.linalg.LinAlgError(f"GMRES found no solution in {solution.products} products with the FFT operator")
+    return solution.x
 
-    blocks: _Blocks
+
+class _Source(NamedTuple):
+    """What a kept preconditioner was made from."""
+
     nodes: Nodes
     tau: float
     rods: RodStiffness
@@ -251,47 +206,46 @@ class _Kept(NamedTuple):
 class StokesByKrylov(StokesByFFT):
     """IB Stokes for many nodes: GMRES on the FFT operator, preconditioned rod by rod, factors kept while they serve.
 
-    They are made anew when tau changes by more than a fifth, or after a solve took half as many products again as their
-    first: counts decide, never a clock. What they were made from is part of a run's state, so that a resumed run has
-    the same ones.
+    ``worth`` is what making them costs, in products. What they were made from is part of a run's state, so that a
+    resumed run has the same ones.
     """
 
-    residual = _LOOSE
-
-    def __init__(self, fluid: Immersed, solver: Solver) -> None:
+    def __init__(self, fluid: Immersed, solver: Solver, worth: float) -> None:
         super().__init__(fluid, solver)
-        self._kept: _Kept | None = None
-        self._tired, self._first = False, 0
+        self._kept = krylov.Kept(worth)
+        self._source: _Source | None = None
 
-    def preconditioner(self, response: _Fourier, statement: Reduced) -> _Blocks:
-        """The kept factors, or new ones."""
+    def solve(self, response: _Fourier, statement: Reduced, product: krylov.Product, right: np.ndarray) -> np.ndarray:
+        """x with product(x) = right, by the factors kept, and where these do not serve by new ones."""
         kept = self._kept
-        if kept is None or self._tired or abs(kept.tau - response.tau) > 0.2 * response.tau:
-            kept = self._keep(response.nodes, response.tau, statement.frozen())
-        return kept.blocks
+        response.solves += 1
+        fresh = not kept.fits(response.tau) or (response.solves == 2 and kept.end_round())
+        while True:
+            if fresh:
+                self._make(_Source(response.nodes, response.tau, statement.frozen()))
+            assert kept.blocks is not None
+            found = krylov.solve(product, right, kept.blocks, _LOOSE, _MOST if fresh else kept.patience)
+            kept.now += found.products
+            if found.found or fresh:
+                return _checked(found)
+            kept.failed()
+            fresh = True
 
-    def _keep(self, nodes: Nodes, tau: float, rods: RodStiffness) -> _Kept:
-        self._kept = _Kept(self._factor(nodes, tau, rods, self.fluid.rods), nodes, tau, rods)
-        self._tired, self._first = False, 0
-        return self._kept
-
-    def took(self, count: int) -> None:
-        """New factors for the next solve where this one took too long."""
-        self._first = self._first or count
-        self._tired = count > _PATIENCE * self._first + 4
+    def _make(self, source: _Source) -> None:
+        self._source = source
+        self._kept.renew(self._factored(source.nodes, source.tau, source.rods, self.fluid.rods), source.tau)
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """What the kept factors were made from; empty before there are any."""
-        if self._kept is None:
+        if self._source is None:
             return {}
-        kept = self._kept
-        named = {k: v for k, v in kept.rods._asdict().items() if v is not None} | vars(kept.nodes)
-        return {"tau": kept.tau, "tired": float(self._tired), "first": float(self._first), **named}
+        rods = {name: value for name, value in self._source.rods._asdict().items() if value is not None}
+        return {**rods, **vars(self._source.nodes), **self._kept.memory()}
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:
         """Makes the factors of ``memory`` again."""
         arrays = {k: np.asarray(v) for k, v in memory.items()}
         rods = RodStiffness(arrays["band"], arrays["held"].astype(np.int64), arrays.get("turns"), arrays.get("still"))
         nodes = Nodes(arrays["base"].astype(np.int64), arrays["weights"], arrays["axes"])
-        self._keep(nodes, float(arrays["tau"]), rods)
-        self._tired, self._first = bool(arrays["tired"]), int(arrays["first"])
+        self._make(_Source(nodes, float(arrays["tau"]), rods))
+        self._kept.recall({k: float(v) for k, v in memory.items() if not isinstance(v, np.ndarray)})

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scenes import swimmer
 
+from ibfil import krylov
 from ibfil.case import parse_case
 from ibfil.errors import CaseError
 from ibfil.report import memory
@@ -136,3 +138,59 @@ def test_thickness_chooses_the_grid():
     odd = text.replace("cells = [32, 32, 32]", "thickness = 0.1105").replace("3.2, 3.2, 3.2", "3.2, 3.2, 3.7")
     with pytest.raises(CaseError, match=r"fluid\.thickness.*box = "):
         Simulation(parse_case(odd, "t.toml"))
+
+
+def test_a_stiff_rod_of_many_nodes_is_not_given_up_for_rounding():
+    """200 nodes a tenth of a cell apart, EA = 50: by these paths steps were halved where the table needs none."""
+    paths = {}
+    for method in ("table", "krylov", "fft"):
+        fluid = {"model": "stokes", "box": [1.4] * 3, "cells": [28] * 3, "slip": 0.01, "method": method}
+        simulation = Simulation(swimmer(fluid, stretching=50.0, end=0.06, step=0.03, rod={"nodes": 200}))
+        simulation.advance(0.06, lambda: None)
+        assert simulation.shortened == 0
+        paths[method] = simulation.shape.r
+    for method in ("krylov", "fft"):
+        assert np.abs(paths[method] - paths["table"]).max() < 1e-8
+
+
+def test_a_dense_system_takes_a_band_as_it_takes_a_full_matrix():
+    rng, n = np.random.default_rng(1), 240
+    full, matrix, held = rng.standard_normal((n, n)), rng.standard_normal((n, n)), np.array([3, 200])
+    band = np.triu(np.tril(full, 20), -20)
+    for stiffness in (full, band, np.zeros((n, n))):
+        system = krylov.dense_system(matrix, stiffness, 0.3, held)
+        expected = np.eye(n) - 0.3 * matrix @ stiffness
+        expected[:, held] = -0.3 * matrix[:, held]
+        assert np.allclose(system, expected, rtol=0, atol=1e-12)
+
+
+def _rounds(kept, products):
+    """For each round of solves, of so many products, whether the factors are made anew after it."""
+    made = []
+    for count in products:
+        kept.now += count
+        made.append(kept.end_round())
+        if made[-1]:
+            kept.renew(krylov.Blocks([], np.ones(0)), 1.0)
+    return made
+
+
+def test_a_preconditioner_is_kept_while_that_is_cheaper_than_the_mean():
+    kept = krylov.Kept(100.0)
+    kept.renew(krylov.Blocks([], np.ones(0)), 1.0)
+    assert kept.fits(0.8)
+    assert not kept.fits(0.5)
+    # (100 + 10)/1, (100 + 30)/2 = 65, (100 + 80)/3 = 60 < 90: the fourth round was one too many
+    assert _rounds(kept, [10, 20, 50, 90]) == [False, False, False, True]
+    # remembered: three rounds from now on
+    assert _rounds(kept, [10, 20, 50, 10, 20, 50]) == [False, False, True] * 2
+
+
+def test_a_preconditioner_that_serves_once_is_made_each_round_but_for_a_trial():
+    kept = krylov.Kept(5.0)
+    kept.renew(krylov.Blocks([], np.ones(0)), 1.0)
+    made = []
+    for _ in range(12):
+        made += _rounds(kept, [40 if not made or made[-1] else 60])
+    assert made[:3] == [False, True, True]
+    assert made.count(False) == 2  # the trials

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
-from ibfil import stokes
+from ibfil import krylov
 from ibfil.fluid import Held
 from ibfil.grid import Grid
 from ibfil.immersed import Immersed, slip_mobility
@@ -219,7 +219,7 @@ def test_fft_solve_that_does_not_converge_says_so_as_a_singular_matrix_does(monk
     n = 5
     grid = Grid([1.2] * 3, [12] * 3)
     fluid = by_fft(immersed(grid, n))
-    monkeypatch.setattr(stokes, "gmres", lambda *args, **more: (np.zeros(3 * n), 1))
+    monkeypatch.setattr(krylov, "gmres", lambda *args, **more: (np.zeros(3 * n), 1))
     response = fluid.response(np.random.default_rng(2).uniform(-0.5, 0.5, (n, 3)), np.zeros((n, 3)), 0.0, 0.1)
     zero = np.zeros((n, 3))
     with pytest.raises(np.linalg.LinAlgError, match="GMRES"):
