@@ -1,6 +1,7 @@
 """ibfil: elastic filaments in viscous fluids.
 
-From Python, ``ibfil.run("case.toml")`` does what ``ibfil run case.toml`` does. The names below are looked up
+From Python, ``ibfil.run("case.toml")`` does what ``ibfil run case.toml`` does and ``ibfil.open("case.h5")`` reads what
+it wrote. The names below are looked up
 when they are first used, so that ``import ibfil`` and the command line's help cost nothing.
 """
 
@@ -13,7 +14,8 @@ if TYPE_CHECKING:
     from .case import Case, parse_case, read_case
     from .errors import CaseError, Interrupted, RunFailed
     from .members import Member, Outcome, run_members
-    from .record import RunFile
+    from .opened import Run
+    from .opened import open_run as open
     from .running import run
     from .simulation import Simulation
     from .vtk import write_vtk
@@ -30,7 +32,8 @@ _HOME = {
     "Member": "members",
     "Outcome": "members",
     "run_members": "members",
-    "RunFile": "record",
+    "Run": "opened",
+    "open": "opened:open_run",
     "run": "running",
     "Simulation": "simulation",
     "write_vtk": "vtk",
@@ -42,10 +45,11 @@ __all__ = [
     "Interrupted",
     "Member",
     "Outcome",
+    "Run",
     "RunFailed",
-    "RunFile",
     "Simulation",
     "__version__",
+    "open",
     "parse_case",
     "read_case",
     "run",
@@ -58,6 +62,7 @@ def __getattr__(name: str) -> Any:
     """Import the module of a public name when the name is first used."""
     if name not in _HOME:
         raise AttributeError(f"module 'ibfil' has no attribute '{name}'")
-    value = getattr(importlib.import_module(f"ibfil.{_HOME[name]}"), name)
+    module, _, attribute = _HOME[name].partition(":")
+    value = getattr(importlib.import_module(f"ibfil.{module}"), attribute or name)
     globals()[name] = value
     return value

@@ -76,10 +76,10 @@ def differences(a: Case, b: Case) -> list[str]:
 
 
 def idle_keys(case: Case) -> list[str]:
-    """The keys of the file that do nothing under its fluid, and the parameters that nothing uses."""
+    """The keys of the file that do nothing under its fluid and start shapes, and the parameters that nothing uses."""
     raw = load(case.text)
     fluid = case.fluid
-    idle = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
+    idle: dict[str, list[str]] = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
     if fluid.model == "rft":
         grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "kernel", "slip"]
         idle["fluid"] += [*grid, "method", "precision", "rotation"]
@@ -88,9 +88,18 @@ def idle_keys(case: Case) -> list[str]:
         turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())
         spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None
         idle["fluid"] += [] if turns and spin else ["drag"]
-    written = [f"{table}.{key}" for table, names in idle.items() for key in names if key in raw.get(table, {})]
+    placing = ["position", "anchor", "direction", "align", "normal"]
+    idle |= {f"filament.{name}": placing for name, f in case.filaments.items() if f.shape.kind == "run"}
+    written = [f"{table}.{key}" for table, names in idle.items() for key in names if key in _table(raw, table)]
     used = set(re.findall(r"[A-Za-z_]\w*", " ".join(_texts(raw))))
     return written + [f"parameters.{key}" for key in raw.get("parameters", {}) if key not in used]
+
+
+def _table(raw: dict[str, Any], path: str) -> dict[str, Any]:
+    """The table of that path; empty where the file has none."""
+    for part in path.split("."):
+        raw = raw.get(part, {})
+    return raw
 
 
 # --- the steps of reading -------------------------------------------------------------------------

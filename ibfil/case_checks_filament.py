@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from .case_checks_planar import check_planar
 from .case_faults import Fault, shown
-from .case_filament import Circle, End, Filament, Helix, TwoWell
+from .case_filament import Circle, End, Filament, Helix, RunShape, TwoWell
 from .case_schema import Scene
 from .expressions import Expression, ExpressionError
 
@@ -121,6 +121,8 @@ def _place(key: str, filament: Filament) -> Iterator[Fault]:
             yield Fault(f"{key}.copies.region", "nothing", "two corners, with count")
         elif copies.file is not None and copies.model_fields_set != {"file"}:
             yield Fault(f"{key}.copies", "file and other keys", "file alone, or {count, region}")
+    if copies is not None and isinstance(filament.shape, RunShape):
+        yield Fault(f"{key}.copies", 'copies with shape.kind = "run"', "a filament for each, or another kind of shape")
     if copies is not None and copies.region is not None:
         low, high = copies.region
         if any(a > b for a, b in zip(low, high, strict=True)):

@@ -108,6 +108,11 @@ def _parser() -> argparse.ArgumentParser:
     vtk = add("vtk", _vtk, "write ParaView files: a .pvd collection of filaments and fields")
     vtk.add_argument("run", metavar="RUN.h5")
     vtk.add_argument("-o", dest="folder", metavar="DIR", help="the folder (default: the run's name)")
+    vtk.add_argument("--wrap", action="store_true", help="bring filaments into the periodic box, cut at its faces")
+    vtk.add_argument("--images", type=_count, default=0, metavar="N", help="periodic images in N boxes on each side")
+    vtk.add_argument(
+        "--watch", type=_seconds, nargs="?", const=5.0, metavar="SECONDS", help="follow a run until it ends (5 s)"
+    )
     add_studies(add)
     verify = add("verify", _verify, "run shipped or given cases and hold their [expect] numbers against the result")
     verify.add_argument("cases", nargs="*", metavar="CASE")
@@ -115,6 +120,24 @@ def _parser() -> argparse.ArgumentParser:
     bench = add("bench", _bench, "time the pieces of a step against floors measured in the same run")
     bench.add_argument("--json", action="store_true", help="as JSON")
     return parser
+
+
+def _count(text: str) -> int:
+    """A whole number from 0 to 9."""
+    if len(text) != 1 or not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: 0 to 9")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    """A time above zero."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: a number of seconds above 0")
+    return value
 
 
 def _read(words: Sequence[str]) -> Case:
@@ -264,7 +287,9 @@ def _show(arguments: argparse.Namespace) -> int:
 def _vtk(arguments: argparse.Namespace) -> int:
     from .vtk import write_vtk
 
-    print(f"open {write_vtk(arguments.run, arguments.folder)} in ParaView")
+    more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": _log}
+    path = write_vtk(arguments.run, arguments.folder, **more)
+    print(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
     return DONE
 
 

@@ -110,6 +110,11 @@ def warnings(simulation: Simulation) -> list[str]:
                 f"{key}: the drag of a straight rod differs by {found['matched scatter']:.2g} of itself between places "
                 "in a cell and directions: set fluid.slip = 0.01, or take a wider fluid.kernel or a larger fluid.box"
             )
+        if filament.shape.kind == "run" and case.fluid.model == "navier-stokes":
+            out.append(
+                f"{key}.shape: the shape of another run, and nothing of its flow: the fluid starts at rest, or in "
+                "fluid.flow"
+            )
         where = simulation.nodes(name)
         out += shapes.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
     return out + _of_run(simulation)

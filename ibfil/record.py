@@ -26,6 +26,7 @@ from .pace import pace_of
 
 if TYPE_CHECKING:
     from .case import Case
+    from .case_filament import Filament
 
 FORMAT = "ibfil-run"
 FORMAT_VERSION = 1
@@ -182,7 +183,12 @@ class RunFile:
         """Arclength (N,) of a filament's nodes at rest."""
         from .shapes import node_arclength
 
-        return node_arclength(self.case.filaments[name])
+        return node_arclength(self.filament(name))
+
+    def filament(self, name: str) -> Filament:
+        """The case's table of a filament; a copy NAME_000 has that of NAME."""
+        tables = self.case.filaments
+        return tables[name] if name in tables else tables[name.rpartition("_")[0]]
 
     @cached_property
     def case(self) -> Case:

@@ -68,11 +68,13 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
     * expression: nodes at r(s), also where |dr/ds| is not 1: the rod then starts stretched
       (``stretch_warning``); e1 without twist.
     * file: points in the file (``points.curve_from_points``), relative to ``folder``.
+    * run: as the filament of the same name, which ``key`` ends with, stood in a run (``points_of_run``), relative to
+      ``folder``; it is not placed anew.
 
     Raises CaseError, one line beginning with ``key``, where the shape cannot be made.
     """
     s = node_arclength(filament, key)
-    curve = place(_own_curve(filament, s, key, Path(folder)), s, filament, key)
+    curve = _placed(filament, s, key, Path(folder))
     e1 = _turned(curve, filament.shape.twist, s, f"{key}.shape.twist")
     r = curve.r
     if any(p.constant != 0.0 for p in filament.shape.perturb):
@@ -92,7 +94,7 @@ def end_tangents(filament: Filament, key: str = "filament", folder: str | Path =
     CaseError as ``initial_shape`` does.
     """
     s = node_arclength(filament, key)
-    slope = place(_own_curve(filament, s, key, Path(folder)), s, filament, key).slope[[0, -1]]
+    slope = _placed(filament, s, key, Path(folder)).slope[[0, -1]]
     if any(p.constant is None for p in filament.shape.perturb):
         slope = slope + derivative(_triple(filament.shape.perturb, f"{key}.shape.perturb"), s[[0, -1]])
     return unit(slope[0]), unit(slope[1])
@@ -110,6 +112,18 @@ def stretch_warning(s: np.ndarray, r: np.ndarray, key: str = "filament") -> list
     ]
 
 
+def _placed(filament: Filament, s: np.ndarray, key: str, folder: Path) -> Curve:
+    """Make the curve of ``shape.kind`` where it is to be; that of another run is there already."""
+    if filament.shape.kind != "run":
+        return place(_own_curve(filament, s, key, folder), s, filament, key)
+    from .points_of_run import curve_from_run
+
+    try:
+        return curve_from_run(filament, key.rpartition(".")[2], s, folder)
+    except ValueError as error:
+        raise CaseError([f"{key}.shape.path: {filament.shape.path}: {error}"]) from None
+
+
 def _own_curve(filament: Filament, s: np.ndarray, key: str, folder: Path) -> Curve:
     """Make the curve of ``shape.kind`` in its own coordinates."""
     shape = filament.shape
@@ -124,12 +138,11 @@ def _own_curve(filament: Filament, s: np.ndarray, key: str, folder: Path) -> Cur
     try:
         if shape.kind == "expression":
             return curve_from_formula(_triple(shape.r, f"{key}.shape.r"), s)
-        if shape.kind == "file":
-            return curve_from_points(read_points(folder / shape.path), s)
+        assert shape.kind == "file"
+        return curve_from_points(read_points(folder / shape.path), s)
     except ValueError as error:
         name = "r" if shape.kind == "expression" else f"path: {shape.path}"
         raise CaseError([f"{key}.shape.{name}: {error}"]) from None
-    raise CaseError([f'{key}.shape.kind: "{shape.kind}" is not built yet'])
 
 
 def _relaxed(filament: Filament, s: np.ndarray, key: str) -> Curve:

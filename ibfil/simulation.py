@@ -342,6 +342,7 @@ class Simulation:
             "iterations": self._iterations,
             # Whole: measured again from r and e1 it may differ in the last bit (compilers fuse a b + c as they like).
             "shape": self.state_now.shape.table,
+            "start": self.start.r,
             "y_old": self.state_now.y_old,
             "dt_old": self.state_now.dt_old,
             "velocity": velocity,
@@ -355,12 +356,17 @@ class Simulation:
         }
 
     def restore(self, state: dict[str, np.ndarray | float | int | str]) -> None:
-        """Takes up a state that ``state`` gave. Raises CaseError where it was made with other laws from Python."""
+        """Takes up a state that ``state`` gave.
+
+        Raises CaseError where it was made with other laws from Python, or from a start shape that has changed since in
+        the file or run it is read from.
+        """
         if state.get("laws", "") != self._laws:
             found, wanted = self._laws or "none", state.get("laws") or "none"
             raise CaseError([f"{self.case.file}: laws: found {found}; the run began with {wanted}"])
         array = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
         number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
+        self._same_start(array["start"])
         shape = Geometry(array["shape"])
         self.state_now = State(number["time"], shape, array["y_old"], number["dt_old"])
         self._last = (array["velocity"], array["force"], array["reaction"])
@@ -374,3 +380,12 @@ class Simulation:
             self._noise.restore(str(state["random"]))
         if self._rods.contact is not None:
             self._rods.contact.since = number["first_contact"]
+
+    def _same_start(self, began: np.ndarray) -> None:
+        """Clamps and tethers hold the start shape, so it must be the one the run began with."""
+        for name, where in zip(self._rods.names, self._rods.nodes, strict=True):
+            moved = float(np.max(np.linalg.norm(self.start.r[where] - began[where], axis=1)))
+            if moved > 1e-9 * self.mechanics.length:  # another machine may differ in the last bits
+                found = f"a start shape that differs by {moved:.3g} from the one the run began with"
+                allowed = "the file or run it is read from, as it was"
+                raise CaseError([f"{self.case.file}: filament.{name}.shape: found {found}; allowed: {allowed}"])

@@ -38,10 +38,10 @@ class Solver(Protocol):
 class StokesSolve:
     """Velocities by FFT: spread, transform, project, transform back, interpolate."""
 
-    def __init__(self, grid: Grid, viscosity: float, threads: int = 1) -> None:
+    def __init__(self, grid: Grid, viscosity: float, threads: int = 1, planning: str = "FFTW_MEASURE") -> None:
         self.grid, self.viscosity = grid, viscosity
         nx, ny, nz = (int(n) for n in grid.cells)
-        self.transform = VectorTransform((nx, ny, nz), threads)
+        self.transform = VectorTransform((nx, ny, nz), threads, planning)
         self._reals = self.transform.modes.view(float)
         (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
         self._waves = (kx, ky, np.repeat(kz, 2), sx, sy, np.repeat(sz, 2))

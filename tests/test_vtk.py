@@ -10,7 +10,8 @@ import pytest
 import pyvista
 from made_run import CELLS, ORIGIN, SPACING, SPEED, flow, make_run
 
-from ibfil import vtk
+from ibfil import vtk, vtk_data
+from ibfil.kernels import KERNELS
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +71,9 @@ def test_arrays_at_the_nodes(collection):
     np.testing.assert_allclose(data["e3"], np.tile([1, 0, 0], (16, 1)), atol=1e-7)
     # Segments carry 1.75, 2.75, ...: a node the mean of its two, an end its only one.
     np.testing.assert_allclose(data["tension"][:9], [1.75, *np.arange(2.25, 9), 8.75])
-    # "0.1 + 0.01*s" on the first, none on the second.
-    np.testing.assert_allclose(data["radius"], [*(0.1 + 0.01 * r[:9, 0]), *np.zeros(7)], rtol=1e-6)
+    # "0.1 + 0.01*s" on the first; the second has no material radius and is as thick as the grid makes a line.
+    line = KERNELS["peskin4"].line_radius * SPACING
+    np.testing.assert_allclose(data["tube_radius"], [*(0.1 + 0.01 * r[:9, 0]), *np.full(7, line)], rtol=1e-6)
 
 
 def test_names_have_nothing_that_paraview_chokes_on(collection):
@@ -83,7 +85,7 @@ def test_directors_are_orthonormal_on_a_helix():
     s = np.linspace(0, 4, 60)
     r = np.column_stack([np.cos(s), np.sin(s), 0.5 * s])
     e1 = np.column_stack([-np.cos(s), -np.sin(s), 0 * s])  # the normal
-    e2, e3 = vtk.directors(r, e1, s)
+    e2, e3 = vtk_data.directors(r, e1, s)
     tangent = np.column_stack([-np.sin(s), np.cos(s), 0.5 + 0 * s]) / np.sqrt(1.25)
     np.testing.assert_allclose(e3, tangent, atol=5e-3)  # second order: (ds^2)/3 at the ends
     frame = np.stack([e1, e2, e3], axis=1)
@@ -101,7 +103,7 @@ def test_a_run_that_went_on_extends_the_collection(tmp_path):
     new = set(after) - set(before)
     assert new == {"made_filaments_000003.vtp", "made_filaments_000004.vtp", "made_grid_000002.vti"}
     same = [name for name in before if before[name] == after[name]]
-    assert set(before) - set(same) == {"made.pvd"}  # the inode tells: the others were not even replaced
+    assert set(before) - set(same) == {"made.pvd", "made_paraview.py"}  # the inode tells: the others were not replaced
 
 
 def test_a_file_of_another_run_is_replaced(tmp_path):

@@ -1,0 +1,74 @@
+"""The examples in docstrings run, in a folder with a case and its run; and every public name has its docstring."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+from pathlib import Path
+
+import pytest
+
+import ibfil
+
+CASE = """
+[filament.rod]
+length = 1.0
+nodes = 9
+derivative = 2
+bending = 1.0
+stretching = 100.0
+shape = { kind = "circle", curvature = 1.0 }
+[fluid]
+model = "stokes"
+viscosity = 1.0
+box = [2.0, 2.0, 2.0]
+cells = [16, 16, 16]
+[time]
+end = 0.002
+step = 1e-3
+[output]
+every = 0.001
+[observe.tip]
+kind = "position"
+at = "finish"
+"""
+
+
+def modules_with_examples() -> list[str]:
+    folder = Path(ibfil.__file__).parent
+    return sorted(path.stem for path in folder.glob("*.py") if ">>> " in path.read_text())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    made = tmp_path_factory.mktemp("examples")
+    (made / "case.toml").write_text(CASE)
+    ibfil.run(made / "case.toml", made / "run.h5", log=lambda line: None)
+    return made
+
+
+@pytest.mark.parametrize("name", modules_with_examples())
+def test_examples_in_docstrings_run(name, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    module = importlib.import_module("ibfil" if name == "__init__" else f"ibfil.{name}")
+    found = doctest.testmod(module, extraglobs={"ibfil": ibfil})
+    assert found.attempted > 0
+    assert found.failed == 0
+
+
+def test_every_public_name_says_what_it_is():
+    for name in ibfil.__all__:
+        value = getattr(ibfil, name)
+        assert name == "__version__" or len(inspect.getdoc(value) or "") > 40, name
+        if inspect.isclass(value):
+            for method, function in inspect.getmembers(value, inspect.isfunction):
+                inherited = not (function.__module__ or "").startswith("ibfil")
+                assert method.startswith("_") or inherited or inspect.getdoc(function), f"{name}.{method}"
+
+
+def test_what_gives_arrays_says_their_shapes():
+    for name in ("velocity_at", "arclength", "position"):
+        assert "(" in inspect.getdoc(getattr(ibfil.Run, name)), name
+    for name in ("run", "open", "read_case", "parse_case", "write_vtk"):
+        assert "Raise" in inspect.getdoc(getattr(ibfil, name)), name
