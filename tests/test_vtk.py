@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista
 from made_run import CELLS, ORIGIN, SPACING, SPEED, flow, make_run
+from runs import HERE, wait_for
 
 from ibfil import vtk, vtk_data
+from ibfil.errors import CaseError
 from ibfil.kernels import KERNELS
+from ibfil.record import RunFile, checkpoint_path
 
 
 @pytest.fixture(scope="module")
@@ -124,3 +130,143 @@ def test_the_raw_form_is_what_is_fast(collection):
     assert b'header_type="UInt64"' in head
     assert b"compressor" not in head
     assert b'<AppendedData encoding="raw">' in text
+
+
+def test_wrapped_filaments_lie_in_the_box_with_their_values(tmp_path):
+    """The long one reaches from x = 0 to 2 in a box that ends at 1.5."""
+    data = blocks(vtk.write_vtk(make_run(tmp_path / "made.h5"), tmp_path / "out", wrap=True), 0.25)[0]
+    assert data.n_lines == 3
+    assert data.points[:, 0].max() <= 1.5
+    s, x = data["arclength"], data.points[:, 0]
+    assert np.all(np.isclose(x, s) | np.isclose(x, s - 3.0))
+    np.testing.assert_allclose(np.sort(x[np.isclose(s, 1.5)]), [-1.5, 1.5])  # a point on each side of the cut
+    np.testing.assert_allclose(data["force"][:, 0], 2 * s, rtol=1e-6)  # as on the unwrapped line
+
+
+def test_periodic_images(tmp_path):
+    data = blocks(vtk.write_vtk(make_run(tmp_path / "made.h5"), tmp_path / "out", images=1), 0.25)[0]
+    assert data.n_lines == 2 * 27
+    plain = np.all(data["image"] == 0, axis=1)
+    assert plain.sum() == 16
+    first = data.points[plain]
+    for shift in ([1, 0, 0], [0, -1, 1]):
+        there = np.all(data["image"] == shift, axis=1)
+        np.testing.assert_allclose(data.points[there], first + np.array(shift) * [3.0, 2.0, 1.0], atol=1e-12)
+
+
+def test_without_a_box_images_are_refused(tmp_path):
+    from fake_simulation import case
+    from runs import run
+
+    run(case("", "time.end=0.1"), tmp_path / "rft.h5")
+    for more in ({"wrap": True}, {"images": 1}):
+        with pytest.raises(CaseError, match="rft has no periodic box"):
+            vtk.write_vtk(tmp_path / "rft.h5", **more)
+
+
+def test_q_is_positive_in_a_vortex_and_negative_in_strain():
+    """Solid rotation w about z: Q = w^2; pure strain a: Q = -a^2; simple shear: 0. All linear, so exact to rounding."""
+    x, y, z = np.meshgrid(*(np.linspace(0, 1, n) for n in (5, 6, 7)), indexing="ij")
+    spacing = np.array([1 / 4, 1 / 5, 1 / 6])
+    for u, q in (((-2 * y, 2 * x, 0 * z), 4.0), ((3 * x, -3 * y, 0 * z), -9.0), ((5 * y, 0 * x, 0 * z), 0.0)):
+        np.testing.assert_allclose(vtk_data.q_criterion(np.stack(u, axis=-1), spacing), q, atol=1e-12)
+
+
+def test_q_is_in_the_collection(collection):
+    grid = blocks(collection, 1.0)[1]
+    # flow = (x + 10 y + 100 z, x y + t, z - 7 t x): G has rows (1, 10, 100), (y, x, 0), (-7, 0, 1).
+    x, y = grid.points[:, 0], grid.points[:, 1]
+    trace = 2 + x
+    square = 1 + 10 * y - 700 + (10 * y + x**2) + (-700 + 1)
+    np.testing.assert_allclose(grid["q_criterion"], 0.5 * (trace**2 - square), rtol=1e-4, atol=1e-3)
+
+
+def test_outputs_that_were_cut_back_are_replaced(tmp_path):
+    """Gone on with from a checkpoint, at other times: those after it are forgotten, and none is there twice."""
+    collection = vtk.Collection(make_run(tmp_path / "made.h5"), tmp_path / "out")
+    collection.update()
+    collection.filaments[3:] = [(0.8, "old"), (0.9, "old"), (1.0, "old")]
+    collection.update()
+    assert [time for time, _ in collection.filaments] == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert pyvista.PVDReader(str(collection.path)).time_values == [0.0, 0.25, 0.5, 0.75, 1.0]
+
+
+def test_watching_follows_a_run_to_its_end(tmp_path):
+    code = (
+        "import sys; sys.path[:0] = sys.argv[2:]; from fake_simulation import *; from ibfil import recorder, running\n"
+        "recorder._PAUSE = recorder._SHARE = 0\n"
+        "build = lambda *given: FakeSimulation(*given, pause=0.005)\n"
+        "running.run(case(), sys.argv[1], build=build, progress=False)"
+    )
+    path, said = tmp_path / "run.h5", []
+    writer = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent], stdout=subprocess.DEVNULL)
+    try:
+        wait_for(checkpoint_path(path).exists)
+        collection = vtk.write_vtk(path, tmp_path / "out", watch=0.05, log=said.append)
+    finally:
+        writer.kill()
+        writer.wait()
+    with RunFile(path) as run:
+        assert run.status == "finished"
+        assert pyvista.PVDReader(str(collection)).time_values == run.time.tolist()
+    assert len(said) > 2
+
+
+def pvpython() -> list[str]:
+    """The command that runs a script in ParaView without a display."""
+    found = shutil.which("pvpython")
+    if not found:
+        pytest.skip("pvpython is not installed: ParaView itself has not read these files")
+    if not shutil.which("xvfb-run"):
+        pytest.skip("xvfb-run is not installed: pvpython cannot save pictures here")
+    return ["xvfb-run", "-a", found]
+
+
+def test_paraview_itself_reads_tubes_and_traces(collection, tmp_path):
+    """The real client: times, values at t = 0.75, Tube, Stream Tracer, a picture."""
+    script = tmp_path / "look.py"
+    script.write_text(
+        f"""
+from paraview.simple import *
+run = PVDReader(FileName={str(collection)!r})
+run.UpdatePipelineInformation()
+print("times", *run.TimestepValues)
+run.UpdatePipeline(0.75)
+rods = ExtractBlock(Input=run, Selectors=["/Root/Block0"])
+rods.UpdatePipeline(0.75)
+print("y", rods.GetDataInformation().GetBounds()[2:4])
+tubes = Tube(Input=rods)
+tubes.Scalars, tubes.VaryRadius = ["POINTS", "tube_radius"], "By Absolute Scalar"
+tubes.UpdatePipeline(0.75)
+print("z", tubes.GetDataInformation().GetBounds()[4:6])
+flow = ExtractBlock(Input=run, Selectors=["/Root/Block1"])
+flow.UpdatePipeline(0.75)
+lines = StreamTracer(Input=flow, SeedType="Point Cloud")
+lines.Vectors = ["POINTS", "velocity"]
+lines.SeedType.Center, lines.SeedType.Radius = [0.0, 0.0, 0.0], 0.3
+lines.UpdatePipeline(0.75)
+print("lines", lines.GetDataInformation().GetNumberOfPoints())
+view = GetActiveViewOrCreate("RenderView")
+Show(tubes, view), Show(lines, view)
+SaveScreenshot({str(tmp_path / "look.png")!r}, view)
+"""
+    )
+    done = subprocess.run([*pvpython(), script], capture_output=True, text=True, timeout=120)
+    told = dict(line.split(" ", 1) for line in done.stdout.splitlines() if " " in line)
+    assert told["times"] == "0.0 0.25 0.5 0.75 1.0", done.stderr
+    assert eval(told["y"]) == (2.25, 2.25)  # SPEED * 0.75
+    low, high = eval(told["z"])  # the first lies at z = 0, 0.1 to 0.12 thick; the second at 1, as thick as the grid
+    assert low == pytest.approx(-0.12, abs=0.01)
+    assert high == pytest.approx(1 + KERNELS["peskin4"].line_radius * SPACING, abs=0.02)
+    assert int(told["lines"]) > 100
+    assert (tmp_path / "look.png").stat().st_size > 5000
+
+
+def test_the_ready_scene_opens_in_paraview(collection, tmp_path):
+    scene = collection.with_name("made_paraview.py")
+    picture = tmp_path / "scene.png"
+    done = subprocess.run([*pvpython(), scene, picture], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "rror" not in done.stderr
+    pixels = pyvista.read(picture)["PNGImage"].reshape(960, 1280, -1)[..., :3]
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 200  # tubes, a slice, letters, and no blank page
