@@ -259,6 +259,10 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     # The averaged table is an approximation: on request only.
     exact = [name for name in seconds if name != "averaged"]
     method = case.fluid.method if case.fluid.method != "auto" else min(exact, key=lambda name: seconds[name])
+    if case.fluid.model == "navier-stokes":
+        from .assemble_inertia import navier_stokes
+
+        return navier_stokes(case, made, method, _worth(case, stacked, grid)), method, grid
     if method == "table":
         return stokes.StokesByTable(made), method, grid
     if method == "averaged":

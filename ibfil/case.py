@@ -12,7 +12,6 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel, ValidationError
 
-from . import not_built
 from .case_checks import check
 from .case_faults import Fault, Found, dotted, example, found_by_pydantic, shown
 from .case_overrides import apply, load, split
@@ -139,7 +138,7 @@ def _read(raw: dict[str, Any]) -> tuple[Scene | None, list[Fault]]:
                 tainted.update((dotted(found.path), *(found.fault.reads if found.fault else ())))
                 _prune(filled, found)
     if scene is not None:
-        faults += [fault for fault in (*check(scene), *not_built.faults(scene)) if not fault.touches(tainted)]
+        faults += [fault for fault in check(scene) if not fault.touches(tainted)]
     return scene, faults
 
 

@@ -80,6 +80,9 @@ def _fluid(case: Scene) -> Iterator[Fault]:
         if not _periodic(fluid):
             allowed = "with navier-stokes, a uniform or box-periodic one"
             yield Fault("fluid.flow", "a flow that differs across the box", allowed, ("fluid.box", "fluid.model"))
+        if fluid.method in ("pruned", "averaged"):
+            found = f"{shown(fluid.method)} with navier-stokes, whose past fills the box"
+            yield Fault("fluid.method", found, '"auto", "table", "fft" or "krylov"', ("fluid.model",))
     twisted = any(filament.twisting is not None for filament in case.filaments.values())
     if fluid.model != "rft" and "rotation" in fluid.model_fields_set and not twisted:
         yield Fault("fluid.rotation", shown(fluid.rotation), "only where a filament has twisting", ("filament",))

@@ -73,18 +73,12 @@ class GridFields:
         modes[0] = -1j * (k[0] * force[0] + k[1] * force[1] + k[2] * force[2]) / square
         return np.ascontiguousarray(self._real(modes, None)[..., 0])
 
-    def _points(self) -> np.ndarray:
-        """Places (nx ny nz, 3) of the grid points."""
-        grid = self.grid
-        axes = [start + grid.spacing * np.arange(n) for start, n in zip(grid.origin, grid.cells, strict=True)]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-
     def _background(self, time: float) -> np.ndarray | None:
         if self.flow is None:
             return None
-        return self.flow(self._points(), time).reshape(*self.grid.cells, 3)
+        return self.flow(self.grid.points(), time).reshape(*self.grid.cells, 3)
 
     def _background_curl(self, time: float) -> np.ndarray | None:
         if self.flow is None:
             return None
-        return curl(self.flow, self._points(), time, self.grid.spacing).reshape(*self.grid.cells, 3)
+        return curl(self.flow, self.grid.points(), time, self.grid.spacing).reshape(*self.grid.cells, 3)

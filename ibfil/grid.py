@@ -52,6 +52,11 @@ class Grid:
         """Positions (n, 3) in units of the spacing, from grid index (0, 0, 0)."""
         return r / self.spacing + self.cells // 2
 
+    def points(self) -> np.ndarray:
+        """Places (nx ny nz, 3) of the grid points."""
+        axes = [start + self.spacing * np.arange(n) for start, n in zip(self.origin, self.cells, strict=True)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
     def wave_numbers(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """For each axis the wave numbers of derivatives, and the true k^2; the last axis is halved (real fields)."""
         ks, squares = [], []

@@ -13,6 +13,7 @@ from numba import njit
 from . import assemble, driving, timescales
 from .camera import Camera, Moment
 from .errors import CaseError, RunFailed
+from .fluid import Held
 from .geometry import Geometry
 from .marching import ControlledSteps, EvenSteps
 from .stepping import State, Step
@@ -139,7 +140,7 @@ class Simulation:
     @property
     def _transforms(self) -> bool:
         """Whether steps transform fields."""
-        return self.method not in ("rft", "table", "averaged")
+        return self.method not in ("rft", "table", "averaged") or self.case.fluid.model == "navier-stokes"
 
     def _learn(self) -> None:
         from . import transforms
@@ -320,11 +321,13 @@ class Simulation:
         """Velocity, force on the fluid and reaction (n, m): of the last step, or of the start."""
         if self._last is None:
             force, _ = self.mechanics.forces(self.state_now.shape, self.time)
-            small = 1e-6 * self.case.time.end / 1000
-            held = self.mechanics.held(self.time, self.time + small)
-            response = self.fluid.response(self.state_now.shape.r, self.state_now.shape.e3, self.time, small)
+            small, dt = 1e-6 * self.case.time.end / 1000, self.step_length
+            index, value = self.mechanics.held(self.time, self.time + small)
+            # Over a whole step at the speeds of this moment: a fluid with inertia resists a sudden start without limit.
+            held = Held(index, value * (dt / small))
+            response = self.fluid.response(self.state_now.shape.r, self.state_now.shape.e3, self.time, dt)
             answer = response.forced(force, held, np.zeros_like(force))
-            self._last = (answer.move / small, answer.force, answer.reaction)
+            self._last = (answer.move / dt, answer.force, answer.reaction)
         return self._last
 
     def frame(self, fields: Sequence[str] = ()) -> Frame:

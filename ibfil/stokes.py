@@ -9,6 +9,7 @@ krylov   either FFT, for many nodes: the preconditioner is the exact matrix rod 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -36,13 +37,24 @@ class Solver(Protocol):
 
 
 class StokesSolve:
-    """Velocities by FFT: spread, transform, project, transform back, interpolate."""
+    """Velocities by FFT: spread, transform, project, transform back, interpolate.
 
-    def __init__(self, grid: Grid, viscosity: float, threads: int = 1, planning: str = "FFTW_MEASURE") -> None:
-        self.grid, self.viscosity = grid, viscosity
+    ``alpha`` is density over time, zero in Stokes flow; a ``transform`` at hand is used, and what it held is lost.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        viscosity: float,
+        threads: int = 1,
+        planning: str = "FFTW_MEASURE",
+        alpha: float = 0.0,
+        transform: VectorTransform | None = None,
+    ) -> None:
+        self.grid, self.viscosity, self.alpha = grid, viscosity, alpha
         nx, ny, nz = (int(n) for n in grid.cells)
-        self.transform = VectorTransform((nx, ny, nz), threads, planning)
-        self._reals = self.transform.modes.view(float)
+        self.transform = transform or VectorTransform((nx, ny, nz), threads, planning)
+        self._reals = self.transform.modes.view(float)[:3]
         (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
         self._waves = (kx, ky, np.repeat(kz, 2), sx, sy, np.repeat(sz, 2))
         self._scale = 1.0 / (self.transform.size * grid.spacing**3)
@@ -50,10 +62,10 @@ class StokesSolve:
     def field(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The velocity (3, nx, ny, nz) that nodal forces (n, 3) drive; overwritten by the next call."""
         t = self.transform
-        t.real[:] = 0.0
+        t.real[:3] = 0.0
         spread(base, weights, force, t.real)
         t.forward()
-        project(self._reals, *self._waves, 0.0, self.viscosity, self._scale)
+        project(self._reals, *self._waves, self.alpha, self.viscosity, self._scale)
         return t.backward()
 
     def velocity(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -81,12 +93,15 @@ class _Dense(ImmersedResponse):
         return np.linalg.solve(krylov.dense_system(self.matrix, stiffness, self.tau, statement.index), right)
 
 
-class Tabulated(Memoryless):
-    """A Stokes fluid that has the grid's response to a point force at hand."""
+class Tabulated(Memoryless, ABC):
+    """A Stokes fluid that has the grid's response to a point force at hand.
 
-    def __init__(self, fluid: Immersed) -> None:
+    With an ``alpha``, density over time, it is the part of an unsteady one that answers to forces (navier_stokes.py).
+    """
+
+    def __init__(self, fluid: Immersed, alpha: float = 0.0) -> None:
         self.fluid = fluid
-        response = fluid.coupling.response(fluid.grid, fluid.viscosity, 0.0)
+        response = fluid.coupling.response(fluid.grid, fluid.viscosity, alpha)
         self._table: np.ndarray = mobility.octant(response, fluid.kernel.points).astype(fluid.number)
 
     def velocity_at(
@@ -100,6 +115,10 @@ class Tabulated(Memoryless):
         block = fluid.coupling.block(self._table, fluid.grid.cells, nodes, np.zeros((k + n, c)), rows, columns)
         u = (block @ force[:, :c].ravel()).reshape(k, c)[:, :3]
         return u if fluid.flow is None else u + fluid.flow(points, time)
+
+    @abstractmethod
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> ImmersedResponse:
+        """The mobility of nodes r (n, 3) with tangents e3 (n, 3)."""
 
     def matrix(self, nodes: Nodes, own: np.ndarray) -> np.ndarray:
         """The exact mobility (c n, c n) of nodes, with ``own`` (n, c) on its diagonal."""
@@ -160,8 +179,8 @@ class _Fourier(ImmersedResponse):
 class StokesByFFT(Tabulated):
     """IB Stokes by FFT; GMRES is preconditioned by the exact matrix of all nodes and so needs an iteration or two."""
 
-    def __init__(self, fluid: Immersed, solver: Solver) -> None:
-        super().__init__(fluid)
+    def __init__(self, fluid: Immersed, solver: Solver, alpha: float = 0.0) -> None:
+        super().__init__(fluid, alpha)
         self.solver = solver
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Fourier:
@@ -210,8 +229,8 @@ class StokesByKrylov(StokesByFFT):
     resumed run has the same ones.
     """
 
-    def __init__(self, fluid: Immersed, solver: Solver, worth: float) -> None:
-        super().__init__(fluid, solver)
+    def __init__(self, fluid: Immersed, solver: Solver, worth: float, alpha: float = 0.0) -> None:
+        super().__init__(fluid, solver, alpha)
         self._kept = krylov.Kept(worth)
         self._source: _Source | None = None
 

@@ -56,13 +56,16 @@ class VectorTransform:
     """Forward and backward transforms of ``real`` (3, nx, ny, nz) and ``modes`` (3, nx, ny, nz//2 + 1).
 
     ``forward`` keeps ``real``; ``backward`` overwrites both, and leaves the normalisation 1/(nx ny nz) to the caller.
-    ``planning`` is FFTW's: "FFTW_ESTIMATE" for a few transforms, "FFTW_MEASURE" for many.
+    ``planning`` is FFTW's: "FFTW_ESTIMATE" for a few transforms, "FFTW_MEASURE" for many. ``fields`` more than 3 are
+    transformed forward only.
     """
 
-    def __init__(self, cells: tuple[int, int, int], threads: int = 1, planning: str = "FFTW_MEASURE") -> None:
+    def __init__(
+        self, cells: tuple[int, int, int], threads: int = 1, planning: str = "FFTW_MEASURE", fields: int = 3
+    ) -> None:
         nx, ny, nz = cells
-        self.real = pyfftw.zeros_aligned((3, nx, ny, nz))
-        self.modes = pyfftw.zeros_aligned((3, nx, ny, nz // 2 + 1), dtype=complex)
+        self.real = pyfftw.zeros_aligned((fields, nx, ny, nz))
+        self.modes = pyfftw.zeros_aligned((fields, nx, ny, nz // 2 + 1), dtype=complex)
         self.size = nx * ny * nz
 
         def plan(component: int, direction: str) -> pyfftw.FFTW:
@@ -76,19 +79,19 @@ class VectorTransform:
                 planning_timelimit=_LIMIT,
             )
 
-        self._forward = [plan(c, "FFTW_FORWARD") for c in range(3)]
+        self._forward = [plan(c, "FFTW_FORWARD") for c in range(fields)]
         self._backward = [plan(c, "FFTW_BACKWARD") for c in range(3)]
         self.real[:] = 0.0
         self.modes[:] = 0.0
 
-    def forward(self) -> np.ndarray:
-        """``modes`` of ``real``."""
-        for plan in self._forward:
+    def forward(self, fields: int = 3) -> np.ndarray:
+        """``modes`` of the first ``fields`` of ``real``."""
+        for plan in self._forward[:fields]:
             plan.execute()
         return self.modes
 
     def backward(self) -> np.ndarray:
-        """``real`` of ``modes``, times the number of cells."""
+        """``real`` of the first three of ``modes``, times the number of cells."""
         for plan in self._backward:
             plan.execute()
         return self.real

@@ -11,7 +11,6 @@ import tomllib
 
 import pytest
 
-from ibfil import not_built
 from ibfil.case import (
     Case,
     differences,
@@ -275,12 +274,6 @@ along = [1, 0, 0]
 EXAMPLES = [BROWNIAN_HELIX, FLAILING, HELIX_IN_FLOW, RIBBON, SWIMMER, WHIRLING]
 
 
-@pytest.fixture
-def all_built(monkeypatch):
-    """Nothing is refused for not being built."""
-    monkeypatch.setattr(not_built, "NOT_BUILT", [])
-
-
 def case(text: str, *overrides: str) -> Case:
     return parse_case(text, "case.toml", overrides)
 
@@ -298,7 +291,6 @@ def faults(text: str, *overrides: str) -> list[str]:
 # --- the paper's cases ----------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize("text", EXAMPLES)
 def test_examples_parse_and_come_back_from_their_own_text(text):
     first = case(text)
@@ -309,7 +301,6 @@ def test_examples_parse_and_come_back_from_their_own_text(text):
     assert pickle.loads(pickle.dumps(first)) == first
 
 
-@pytest.mark.usefixtures("all_built")
 def test_values_of_the_examples():
     helix = case(BROWNIAN_HELIX)
     assert helix.parameters == {"theta": 0.7853981633974483, "seed": 3.0}
@@ -379,7 +370,6 @@ def test_defaults_of_the_shortest_case():
     assert (short.compute.threads, short.output.checkpoint_every) == (1, 60.0)
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize(
     ("overrides", "value", "wanted"),
     [
@@ -416,7 +406,6 @@ def test_defaults_that_depend_on_other_tables(overrides, value, wanted):
 # --- numbers, expressions, unions -----------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize(
     ("override", "value", "wanted"),
     [
@@ -599,7 +588,6 @@ def test_differences_name_the_keys():
     assert differences(a, parse_case(SHORT, "another name")) == []
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize(
     ("model", "overrides", "idle"),
     [
@@ -662,7 +650,6 @@ def test_a_case_without_idle_keys_has_none():
     assert idle_keys(case(SHORT)) == []
 
 
-@pytest.mark.usefixtures("all_built")
 def test_quick_form():
     whole = case(SWIMMER)
     quick = quick_case(whole, "speed")
@@ -682,7 +669,6 @@ def test_quick_form():
     ]
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize(
     ("quick", "words"),
     [
@@ -739,51 +725,6 @@ def test_every_key_is_described():
     for table in [schema, *schema["$defs"].values()]:
         for key, entry in table.get("properties", {}).items():
             assert len(entry.get("description", "")) > 2, (table.get("title"), key)
-
-
-# --- what is not built yet ------------------------------------------------------------------------
-
-ASKING = [
-    ["filament.rod.spacing=q"],
-    ["filament.rod.shape={kind='run', path='a.h5'}"],
-    ["filament.rod.copies={count=2, region=[[0, 0, 0], [1, 1, 1]]}"],
-    ["filament.rod.loads.weight=[0, 0, 1]"],
-    ["filament.rod.finish.force=[0, 0, 1]"],
-    ["filament.rod.finish.moment=[0, 0, 1]"],
-    ["filament.rod.finish.spring.stiffness=1"],
-    ["filament.rod.start={end='hinged', moves=['t', 0, 0]}"],
-    ["filament.rod.start={end='clamped', tangent=[1, 0, 0]}"],
-    ["contact.distance=1"],
-    ["thermal.energy=1"],
-    ["fluid.model=navier-stokes", "fluid.density=1"],
-    ["fluid.flow=[1, 0, 0]"],
-    ["fluid.model=rft", "fluid.drag={matched=1}"],
-    ["fluid={model='stokes', viscosity=1, box=[1, 1, 1], thickness=0.1}"],
-    ["fluid.precision=single"],
-    *([f"fluid.method={method}"] for method in ("pruned", "averaged", "krylov")),
-    ["fluid.rotation=grid", "filament.rod.twisting=1", "filament.rod.radius=0.1"],
-    ["time.tolerance=1e-3"],
-    ["output.probes=[[0, 0, 0]]"],
-    ["output.fields=['pressure']", "output.grid_every=1"],
-]
-GRID = ["fluid.model=stokes", "fluid.box=[4, 4, 4]", "fluid.cells=[40, 40, 40]"]
-
-
-@pytest.mark.parametrize("row", not_built.NOT_BUILT, ids=lambda row: row.what.replace(" ", "_"))
-def test_each_row_refuses_a_case_and_that_alone_is_wrong_with_it(row, monkeypatch):
-    monkeypatch.setattr(not_built, "NOT_BUILT", [])
-    cases = [case(SHORT, *GRID, *asking) if "thermal" not in asking[0] else case(SHORT, *asking) for asking in ASKING]
-    asking = [c for c in cases if row.keys(c)]
-    assert asking, f"no case here asks for {row.what}"
-    assert not row.keys(case(SHORT))
-    assert not row.keys(case(SHORT, *GRID))
-    monkeypatch.setattr(not_built, "NOT_BUILT", [row])
-    for c in asking:
-        (line,) = faults(c.text)
-        key = line.split(": ")[1]
-        assert row.what in line
-        assert "which this version does not build yet" in line
-        assert key.split(".")[-1] in c.text
 
 
 def test_idle_keys_ask_for_nothing():

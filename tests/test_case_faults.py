@@ -11,7 +11,6 @@ import pytest
 import tomli_w
 from pydantic import BaseModel
 
-from ibfil import not_built
 from ibfil.case import parse_case
 from ibfil.case_schema import Scene
 from ibfil.case_values import Formula, Kind, Listed, Number, Place, Whole
@@ -486,12 +485,6 @@ COMBINATIONS = [
 ]
 
 
-@pytest.fixture
-def all_built(monkeypatch):
-    monkeypatch.setattr(not_built, "NOT_BUILT", [])
-
-
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize(
     ("overrides", "key", "words"), COMBINATIONS, ids=lambda v: " ".join(v) if isinstance(v, list) else ""
 )
@@ -503,7 +496,6 @@ def test_what_does_not_go_together(overrides, key, words):
     assert all("; allowed: " in line for line in lines)
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize(
     ("stop", "key", "words"),
     [
@@ -570,7 +562,6 @@ SOUND = [
 ]
 
 
-@pytest.mark.usefixtures("all_built")
 @pytest.mark.parametrize("overrides", SOUND, ids=" ".join)
 def test_what_goes_together(overrides):
     parse_case(tomli_w.dumps(SCENE), "good.toml", overrides)

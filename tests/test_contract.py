@@ -17,6 +17,8 @@ from ibfil.mechanics import Mechanics
 
 GRID = {"model": "stokes", "box": [1.6, 2.0, 1.8], "cells": [16, 20, 18], "slip": 0.01}
 FLOW = ["0.3 + y", "sin(x + t)", "0"]
+INERTIA = {**GRID, "model": "navier-stokes", "density": 3.0}
+PERIODIC = ["0.3", "sin(2*pi*x/1.6 + t)", "0"]
 # The case's [fluid], and how closely one implicit() satisfies the statement, relative to the move.
 FLUIDS: dict[str, tuple[dict[str, Any], float]] = {
     "rft": ({"model": "rft"}, 1e-11),
@@ -30,6 +32,12 @@ FLUIDS: dict[str, tuple[dict[str, Any], float]] = {
     "stirred table in a flow": ({**GRID, "method": "table", "rotation": "grid", "flow": FLOW}, 1e-11),
     "stirred fft": ({**GRID, "method": "fft", "rotation": "grid", "kernel": "es4"}, 1e-10),
     "stirred krylov": ({**GRID, "method": "krylov", "rotation": "grid"}, 1e-4),
+    "navier-stokes table": ({**INERTIA, "method": "table"}, 1e-11),
+    "navier-stokes in a flow": ({**INERTIA, "method": "table", "kernel": "es5", "flow": PERIODIC}, 1e-11),
+    "navier-stokes fft": ({**INERTIA, "method": "fft", "flow": PERIODIC}, 1e-10),
+    "navier-stokes krylov": ({**INERTIA, "method": "krylov"}, 1e-4),
+    "navier-stokes stirred table": ({**INERTIA, "method": "table", "rotation": "grid"}, 1e-11),
+    "navier-stokes stirred fft": ({**INERTIA, "method": "fft", "rotation": "grid", "flow": PERIODIC}, 1e-10),
 }
 
 PLANAR: dict[str, Any] = {
@@ -89,7 +97,8 @@ class Asked(NamedTuple):
     target: np.ndarray
 
 
-def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]]) -> Asked:
+def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2) -> Asked:
+    """With a past of so many steps, where the fluid keeps one."""
     if not any("twisting" in rod for rod in rods.values()):
         fluid = {key: value for key, value in fluid.items() if key != "rotation"}
     stacked = assemble.rods(scene(rods, fluid))
@@ -103,7 +112,9 @@ def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]]) -> Asked:
     force, inner = mechanics.forces(shape, BETWEEN[1])
     stiffness = mechanics.stiffness(shape, start, inner, BETWEEN[1], False)
     target = 1e-3 * rng.standard_normal((n, m))
-    response = made.response(shape.r, shape.e3, BETWEEN[1], TAU)
+    for _ in range(steps):
+        made.advance(made.response(shape.r, shape.e3, BETWEEN[0], 0.8 * TAU), force)
+    response = made.response(shape.r, shape.e3, BETWEEN[1], TAU, 0.5)
     return Asked(made, response, mechanics, shape.r, shape.e3, force, stiffness, held, y, target)
 
 
@@ -182,10 +193,13 @@ def test_nothing_pushes_a_fluid_with_a_free_rod_in_it(fluid, tolerance, name):
 
 @EACH_FLUID
 def test_without_force_nodes_go_where_the_flow_goes(fluid, tolerance):
-    a = asked(fluid, SCENES["free and twisting"])
+    a = asked(fluid, SCENES["free and twisting"], steps=0)
     answer = a.response.forced(np.zeros_like(a.force), a.held, a.target)
-    x, y = a.r[:, 0], a.r[:, 1]
-    flow = np.stack([0.3 + y, np.sin(x + BETWEEN[1]), 0 * x], axis=1) if "flow" in fluid else np.zeros_like(a.r)
+    (x, y), t, flow = a.r.T[:2], BETWEEN[1], np.zeros_like(a.r)
+    if fluid.get("flow") == FLOW:
+        flow = np.stack([0.3 + y, np.sin(x + t), 0 * x], axis=1)
+    elif "flow" in fluid:
+        flow = np.stack([0.3 + 0 * x, np.sin(2 * np.pi * x / 1.6 + t), 0 * x], axis=1)
     assert answer.move[:, :3] == pytest.approx(a.target[:, :3] + TAU * flow, abs=1e-15)
     spin = np.zeros(len(x))
     if "flow" in fluid and fluid.get("rotation") == "grid":
@@ -195,9 +209,10 @@ def test_without_force_nodes_go_where_the_flow_goes(fluid, tolerance):
 
 @EACH_SCENE
 @pytest.mark.parametrize("rotation", ["local", "grid"])
+@pytest.mark.parametrize("grid", [{**GRID, "flow": FLOW}, {**INERTIA, "flow": PERIODIC}], ids=["stokes", "inertia"])
 @pytest.mark.parametrize(("method", "tolerance"), [("fft", 1e-10), ("krylov", 1e-4)])
-def test_the_ways_to_the_grid_agree(method, tolerance, rotation, name):
-    fluid = {**GRID, "flow": FLOW, "rotation": rotation}
+def test_the_ways_to_the_grid_agree(method, tolerance, grid, rotation, name):
+    fluid = {**grid, "rotation": rotation}
     exact, other = (asked({**fluid, "method": m}, SCENES[name]) for m in ("table", method))
     one, two = (a.response.forced(a.force, a.held, a.target) for a in (exact, other))
     assert np.abs(one.move - two.move).max() < 1e-12 * np.abs(one.move).max()

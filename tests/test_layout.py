@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MODULES = {path.stem: path for path in (ROOT / "ibfil").glob("*.py")}
 
-CASE = {"case", "expressions", "not_built", *(name for name in MODULES if name.startswith("case_"))}
+CASE = {"case", "expressions", *(name for name in MODULES if name.startswith("case_"))}
 FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "stirring", "turns", "immersed"}
 RODS = {"rods", "geometry", "frame", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", "observables", "fitted", "expectations"}

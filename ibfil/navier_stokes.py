@@ -1,0 +1,190 @@
+"""The immersed-boundary Navier-Stokes fluid: the statement of Stokes flow with another symbol, and a past.
+
+    rho (u - b)/tau + N* = -grad p + eta Lap u + S F,    b, N* of the last two steps (past.py)
+
+    u = u0 + M F,    u0 = J (alpha + eta k^2)^-1 P (alpha b - N*),    M = J (alpha + eta k^2)^-1 P S,    alpha = rho/tau
+
+M is that of stokes.py with alpha in its symbol, by the same methods, made anew only where alpha changes. A background
+flow U is maintained by whatever drives it: the fluid's own velocity is u' = u - U, from rest, and its advection
+N(U + u') - N(U).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .advection import cut, divergence, products, products_in
+from .fluid import Response
+from .grid import Grid, interpolate, spread
+from .immersed import Flow, Immersed, ImmersedResponse, Nodes
+from .past import Past, Weights, weights
+from .stirring import half_curl
+from .stokes import Tabulated
+from .transforms import VectorTransform
+
+SAME = 1e-9  # steps that differ by less, as the differences of rounded times do, share their operator
+PRODUCTS = 5  # components that go forth for the advection
+KEPT = 2  # operators: Euler's first step has another alpha than BDF2's
+COURANT = 1.0  # cells that the fastest fluid may cross in a step
+
+
+class Background:
+    """A maintained flow on the grid, its aliases cut off; of one moment only where it is ``steady``."""
+
+    def __init__(self, grid: Grid, flow: Flow, steady: bool, threads: int = 1) -> None:
+        self._grid, self._flow, self._steady, self._threads = grid, flow, steady, threads
+        self._known: tuple[float, np.ndarray] | None = None
+
+    def at(self, time: float, most: tuple[int, int, int]) -> np.ndarray:
+        """The velocity (3, nx, ny, nz) at ``time``, its modes up to ``most``."""
+        if self._known is None or not (self._steady or self._known[0] == time):
+            nx, ny, nz = (int(n) for n in self._grid.cells)
+            transform = VectorTransform((nx, ny, nz), self._threads, "FFTW_ESTIMATE")
+            transform.real[:] = self._flow(self._grid.points(), time).T.reshape(3, nx, ny, nz)
+            cut(transform.forward(), most)
+            self._known = time, transform.backward() / transform.size
+        return self._known[1]
+
+
+class Room:
+    """Where fields are transformed; what it holds does not outlive a call, so others may use it too.
+
+    ``flow`` takes PRODUCTS components forth. ``spin`` is there where nodes stir the fluid (stirring.py).
+    """
+
+    def __init__(self, flow: VectorTransform, spin: VectorTransform | None, grid: Grid) -> None:
+        self.flow, self._spin = flow, spin
+        self.modes = flow.modes[:3]
+        self.reals = self.modes.view(float)
+        self._k, _ = grid.wave_numbers()
+
+    def put(self, nodes: Nodes, vectors: np.ndarray) -> None:
+        """Leaves the modes of what nodes put onto the grid: forces (n, 3), or forces and torques (n, 6)."""
+        _spread(nodes, vectors[:, :3], self.flow)
+        if self._spin is not None:
+            _spread(nodes, vectors[:, 3:], self._spin)
+            half_curl(self._spin.modes, *self._k, self.modes)
+
+    def take(self, nodes: Nodes) -> np.ndarray:
+        """What nodes feel of the velocity whose modes it holds: (n, 3), or half the vorticity too (n, 6)."""
+        if self._spin is not None:
+            self._spin.modes[:] = 0.0
+            half_curl(self.modes, *self._k, self._spin.modes)
+        rooms = (self.flow,) if self._spin is None else (self.flow, self._spin)
+        return np.hstack([interpolate(nodes.base, nodes.weights, room.backward()) for room in rooms])
+
+
+def _spread(nodes: Nodes, vectors: np.ndarray, room: VectorTransform) -> None:
+    room.real[:3] = 0.0
+    spread(nodes.base, nodes.weights, vectors, room.real)
+    room.forward()
+
+
+class _Asked(NamedTuple):
+    """The response given last, and how its step looks back."""
+
+    response: ImmersedResponse
+    weights: Weights
+
+
+class NavierStokes:
+    """An immersed-boundary fluid of density rho.
+
+    ``operator`` makes the Stokes fluid (stokes.py) with an alpha in its symbol.
+    """
+
+    def __init__(
+        self,
+        fluid: Immersed,
+        density: float,
+        operator: Callable[[float], Tabulated],
+        room: Room,
+        background: Background | None = None,
+    ) -> None:
+        self.fluid, self.density, self.past = fluid, density, Past(fluid.grid)
+        self._make, self.room, self._background = operator, room, background
+        self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
+        self._asked: _Asked | None = None
+        self.fastest, self.time = 0.0, 0.0
+
+    def _operator(self, alpha: float) -> tuple[float, Tabulated]:
+        """The operator of alpha, or of one that is the same but for round-off."""
+        kept = self._operators
+        found = next((pair for pair in kept if abs(pair[0] - alpha) < SAME * alpha), None)
+        found = found or (alpha, self._make(alpha))
+        self._operators = [found, *(pair for pair in kept if pair is not found)][:KEPT]
+        return found
+
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> ImmersedResponse:
+        """The mobility over a step of effective length tau, and the velocity with which the fluid coasts into it."""
+        alpha, operator = self._operator(self.density / tau)
+        response = operator.response(r, e3, time, tau)
+        past = weights(alpha, tau, w, self.past.dt_old)
+        if self.past.dt_old > 0:
+            self.past.coast(past, self.fluid.viscosity, self.room.reals)
+            u0 = self.fluid.coupling.drop(response.nodes.axes, self.room.take(response.nodes))
+            response.flow = u0 if response.flow is None else response.flow + u0
+        self._asked = _Asked(response, past)
+        return response
+
+    def advance(self, response: Response, force: np.ndarray) -> None:
+        """The velocity at the end of the step, and its advection. Raises ValueError for a step not asked for last."""
+        if self._asked is None or response is not self._asked.response:
+            raise ValueError("a step that is taken must be the one the fluid was asked for last")
+        fluid, room, nodes, past = self.fluid, self.room, self._asked.response.nodes, self._asked.weights
+        room.put(nodes, fluid.coupling.lift(nodes.axes, force))
+        self.past.push(past, fluid.viscosity, room.reals, 1.0 / (room.flow.size * fluid.grid.spacing**3))
+        self.time += past.dt
+        self._advect()
+
+    def _advect(self) -> None:
+        """The advection of the velocity whose band the transform holds."""
+        t, most = self.room.flow, self.past.band.most
+        t.backward()
+        if self._background is None:
+            self.fastest = products(t.real, 0.0)
+        else:
+            self.fastest = products_in(t.real, self._background.at(self.time, most), 0.0)
+        waves, _ = self.fluid.grid.wave_numbers()
+        divergence(t.forward(PRODUCTS), *waves, most, self.density / t.size, self.past.n_now)
+
+    def longest_step(self) -> float:
+        """That in which the fastest fluid crosses COURANT cells."""
+        return COURANT * self.fluid.grid.spacing / self.fastest if self.fastest > 0 else np.inf
+
+    def velocity_at(
+        self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
+    ) -> np.ndarray:
+        """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it; it is the fluid's present one."""
+        fluid = self.fluid
+        self.room.reals[:] = self.past.now
+        u = interpolate(*fluid.stencil(points), self.room.flow.backward())
+        return u if fluid.flow is None else u + fluid.flow(points, time)
+
+    def memory(self) -> dict[str, np.ndarray | float]:
+        """The past, and what the kept operators were made from."""
+        if self.past.dt_old == 0.0:
+            return {}
+        out: dict[str, np.ndarray | float] = {"time": self.time, "fastest": self.fastest}
+        out["alphas"] = np.array([alpha for alpha, _ in self._operators])
+        out |= {f"past_{key}": value for key, value in self.past.memory().items()}
+        for k, (_, operator) in enumerate(self._operators):
+            out |= {f"operator{k}_{key}": value for key, value in operator.memory().items()}
+        return out
+
+    def recall(self, memory: dict[str, np.ndarray | float]) -> None:
+        """Takes up the past, and makes the operators again."""
+
+        def part(prefix: str) -> dict[str, np.ndarray | float]:
+            return {key.removeprefix(prefix): value for key, value in memory.items() if key.startswith(prefix)}
+
+        self.time, self.fastest = float(memory["time"]), float(memory["fastest"])
+        self.past.recall(part("past_"))
+        self._operators = [(float(alpha), self._make(float(alpha))) for alpha in np.asarray(memory["alphas"])]
+        for k, (_, operator) in enumerate(self._operators):
+            known = part(f"operator{k}_")
+            if known:
+                operator.recall(known)

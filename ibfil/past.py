@@ -1,0 +1,134 @@
+"""The past of a fluid with inertia: velocity and advection at the last two steps that were taken, mode by mode.
+
+    u = (alpha + eta k^2)^-1 [ alpha (b_n u_n + b_{n-1} u_{n-1}) + c_n N_n + c_{n-1} N_{n-1} + P f ],   alpha = rho/tau
+
+    Euler   b = 1, 0                                     c = -(1 + w/2), w/2
+    BDF2    b = (1 + w)^2/(1 + 2 w), -w^2/(1 + 2 w)      c = -(1 + w), w,            w = dt/dt_old
+
+the same discretisation of time as the rods' (stepping.py). N is rho div(u u), projected (advection.py). The mean mode
+is zero: a uniform back pressure carries any net force, so the fluid keeps the momentum it began with, none.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from .advection import band, place
+from .grid import Grid
+
+
+class Weights(NamedTuple):
+    """alpha, and what multiplies u_n, u_{n-1}, N_n, N_{n-1} in a step; ``dt`` is its length."""
+
+    alpha: float
+    now: float
+    old: float
+    n_now: float
+    n_old: float
+    dt: float
+
+
+def weights(alpha: float, tau: float, w: float, dt_old: float) -> Weights:
+    """Those of a step: BDF2 with w = dt/dt_old, or Euler (w = 0), whose advection knows dt_old by itself (0: none)."""
+    if w == 0.0:
+        half = 0.5 * tau / dt_old if dt_old > 0 else 0.0
+        return Weights(alpha, alpha, 0.0, -1.0 - half, half, tau)
+    part = alpha / (1 + 2 * w)
+    return Weights(alpha, part * (1 + w) ** 2, -part * w * w, -1.0 - w, w, tau * (1 + 2 * w) / (1 + w))
+
+
+class Past:
+    """Velocities (3, nx, ny, 2 (nz//2 + 1)) and advection in its band, pairs of reals, at the last two steps."""
+
+    def __init__(self, grid: Grid) -> None:
+        nx, ny, nz = (int(n) for n in grid.cells)
+        self.band = band(grid)
+        self.now, self.old = (np.zeros((3, nx, ny, 2 * (nz // 2 + 1))) for _ in range(2))
+        self.n_now, self.n_old = (np.zeros(self.band.shape) for _ in range(2))
+        self.dt_old = 0.0
+        (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
+        self._k, self._s = (kx, ky, np.repeat(kz, 2)), (sx, sy, np.repeat(sz, 2))
+
+    def coast(self, w: Weights, viscosity: float, out: np.ndarray) -> None:
+        """Into ``out`` the velocity's modes, as pairs of reals, at the end of a step without forces."""
+        past = (self.now, self.old, self.n_now, self.n_old)
+        _coast(out, *past, *self._s, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old, self.band.most)
+
+    def push(self, w: Weights, viscosity: float, modes: np.ndarray, scale: float) -> None:
+        """Takes a step with the force density's modes times 1/scale, as pairs of reals; leaves u's band there."""
+        past = (self.now, self.old, self.n_now, self.n_old)
+        wave = (*self._k, *self._s)
+        _push(modes, *past, *wave, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old, scale, self.band.most)
+        self.now, self.old = self.old, self.now
+        self.n_now, self.n_old = self.n_old, self.n_now  # the newest advection is yet to be written into n_now
+        self.dt_old = w.dt
+
+    def memory(self) -> dict[str, np.ndarray | float]:
+        """All of it; nothing before the first step."""
+        if self.dt_old == 0.0:
+            return {}
+        return {"now": self.now, "old": self.old, "n_now": self.n_now, "n_old": self.n_old, "dt_old": self.dt_old}
+
+    def recall(self, memory: dict[str, np.ndarray | float]) -> None:
+        """Takes up what ``memory`` gave."""
+        for name in ("now", "old", "n_now", "n_old"):
+            getattr(self, name)[:] = memory[name]
+        self.dt_old = float(memory["dt_old"])
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _coast(out, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old, most):
+    nx, ny, nz = now.shape[1:]
+    few = 2 * (most[2] + 1)
+    for x in range(3):
+        for i in range(nx):
+            p = place(i, nx, most[0])
+            for j in range(ny):
+                s = alpha + viscosity * (sx[i] + sy[j])
+                q = place(j, ny, most[1])
+                first = few if p >= 0 and q >= 0 else 0
+                for k in range(first):
+                    f = (
+                        b * now[x, i, j, k]
+                        + b_old * old[x, i, j, k]
+                        + c * n_now[x, p, q, k]
+                        + c_old * n_old[x, p, q, k]
+                    )
+                    out[x, i, j, k] = f / (s + viscosity * sz[k])
+                for k in range(first, nz):
+                    out[x, i, j, k] = (b * now[x, i, j, k] + b_old * old[x, i, j, k]) / (s + viscosity * sz[k])
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _push(modes, now, old, n_now, n_old, kx, ky, kz, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old, scale, most):
+    """``old`` becomes the new velocity; ``modes``, the forces', become its band, with zeros elsewhere."""
+    nx, ny, nz = now.shape[1:]
+    few = 2 * (most[2] + 1)
+    for i in range(nx):
+        p = place(i, nx, most[0])
+        for j in range(ny):
+            q = place(j, ny, most[1])
+            first = few if p >= 0 and q >= 0 else 0
+            s, d = alpha + viscosity * (sx[i] + sy[j]), kx[i] * kx[i] + ky[j] * ky[j]
+            for k in range(nz):
+                u, v, w = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
+                square = d + kz[k] * kz[k]
+                f = (kx[i] * u + ky[j] * v + kz[k] * w) / square if square != 0.0 else 0.0
+                g = 1.0 / (s + viscosity * sz[k])
+                u, v, w = scale * (u - kx[i] * f), scale * (v - ky[j] * f), scale * (w - kz[k] * f)
+                old[0, i, j, k] = g * (b * now[0, i, j, k] + b_old * old[0, i, j, k] + u)
+                old[1, i, j, k] = g * (b * now[1, i, j, k] + b_old * old[1, i, j, k] + v)
+                old[2, i, j, k] = g * (b * now[2, i, j, k] + b_old * old[2, i, j, k] + w)
+            for x in range(3):
+                for k in range(first):
+                    g = 1.0 / (s + viscosity * sz[k])
+                    u = old[x, i, j, k] + g * (c * n_now[x, p, q, k] + c_old * n_old[x, p, q, k])
+                    old[x, i, j, k] = modes[x, i, j, k] = u
+                for k in range(first, nz):
+                    modes[x, i, j, k] = 0.0
+    for x in range(3):
+        for k in range(2):
+            old[x, 0, 0, k] = modes[x, 0, 0, k] = 0.0
