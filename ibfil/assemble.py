@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .case_filament import Filament
     from .case_schema import Case
     from .contact import Contact
+    from .fields import GridFields
     from .fluid import Fluid
     from .grid import Grid
     from .immersed import Coupling
@@ -324,6 +325,17 @@ def spacing(case: Case) -> float:
 def twist_radius(case: Case) -> float:
     """The radius of the cylinder that a line of torques on the case's grid spins like."""
     return kernel(case).twist_radius * spacing(case)
+
+
+def fields(case: Case, fluid: Fluid, grid: Grid) -> GridFields:
+    """What makes the fields of the fluid that the case has, for output."""
+    from .fields import GridFields
+    from .inertial_fields import InertialFields
+    from .navier_stokes import NavierStokes
+
+    if isinstance(fluid, NavierStokes):
+        return InertialFields(fluid, flow(case), case.compute.threads)
+    return GridFields(grid, case.fluid.viscosity, flow(case), case.compute.threads)
 
 
 def _box(case: Case, stacked: Stacked, grid: Grid) -> list[int]:

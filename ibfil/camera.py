@@ -107,10 +107,7 @@ class Camera:
         """Fields on the grid: one evaluation of the fluid."""
         assert self.grid is not None
         if self._fields is None:
-            from .fields import GridFields
-
-            fluid = self.case.fluid
-            self._fields = GridFields(self.grid, fluid.viscosity, assemble.flow(self.case), self.case.compute.threads)
+            self._fields = assemble.fields(self.case, self.fluid, self.grid)
         base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
         coupling = assemble.coupling(self.case, self._rods)
         pushes = coupling.lift(coupling.axes(now.state.shape.e3), now.force)

@@ -43,15 +43,20 @@ class GridFields:
         out = {}
         if "pressure" in names:
             out["pressure"] = self._pressure(modes)
-        sx, sy, sz = self._squares
-        project(modes.view(float), *self._waves, sx, sy, np.repeat(sz, 2), 0.0, self.viscosity, 1.0)
+        u = self._velocity(modes)
         if "velocity" in names:
-            out["velocity"] = self._real(modes, self._background(time))
+            out["velocity"] = self._real(u, self._background(time))
         if "vorticity" in names:
-            spin = np.zeros_like(modes)
-            half_curl(modes, *self._axes, spin)
+            spin = np.zeros_like(u)
+            half_curl(u, *self._axes, spin)
             out["vorticity"] = self._real(2 * spin, self._background_curl(time))
         return out
+
+    def _velocity(self, force: np.ndarray) -> np.ndarray:
+        """The velocity's modes from those of the force density, which are lost."""
+        sx, sy, sz = self._squares
+        project(force.view(float), *self._waves, sx, sy, np.repeat(sz, 2), 0.0, self.viscosity, 1.0)
+        return force
 
     def _modes(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The modes of the spread forces (n, 3), as a density."""

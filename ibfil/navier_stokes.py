@@ -147,9 +147,14 @@ class NavierStokes:
         if self._background is None:
             self.fastest = products(t.real, 0.0)
         else:
-            self.fastest = products_in(t.real, self._background.at(self.time, most), 0.0)
+            self.fastest = products_in(t.real, self.background(most), 0.0)
         waves, _ = self.fluid.grid.wave_numbers()
         divergence(t.forward(PRODUCTS), *waves, most, self.density / t.size, self.past.n_now)
+
+    def background(self, most: tuple[int, int, int]) -> np.ndarray:
+        """The maintained flow (3, nx, ny, nz) now, which there must be; its modes up to ``most``."""
+        assert self._background is not None
+        return self._background.at(self.time, most)
 
     def longest_step(self) -> float:
         """That in which the fastest fluid crosses COURANT cells."""

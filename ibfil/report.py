@@ -84,7 +84,10 @@ def modelled(case: Case) -> list[str]:
         if case.thermal is not None:
             out.append(_thermal(case.thermal))
         return out
-    out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
+    if fluid.model == "navier-stokes":
+        out.append("Navier-Stokes flow on a periodic grid, from rest: with inertia and advection")
+    else:
+        out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
     if fluid.slip:
         out.append(f"slip mobility of {fluid.slip:g} of a point's own, against locking")
     if assemble.stirs(case):
@@ -127,7 +130,8 @@ def absent(case: Case) -> list[str]:
         out.append("thermal noise")
     elif not case.thermal.twist and any(f.twisting is not None for f in case.filaments.values()):
         out.append("thermal twist moments")
-    out.append("inertia of the rod and of the fluid; walls; heads; closed rods")
+    whose = "of the rod beyond the fluid it displaces" if case.fluid.model == "navier-stokes" else "of rod and fluid"
+    out.append(f"inertia {whose}; walls; heads; closed rods")
     return out
 
 
@@ -159,7 +163,11 @@ def memory(simulation: Simulation) -> dict[str, float]:
         out["Krylov vectors"] = 60 * 8.0 * parts * n
     else:
         out["dense matrices"] = costs.dense_bytes(n, parts)
-    if simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
+    if case.fluid.model == "navier-stokes":
+        modes = 3 * 16.0 * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
+        out["past of the fluid, as large in a checkpoint"] = 2 * modes * (1 + 0.3)
+        out["its transforms"] = 2 * modes * (5 + 3 * (parts - 3)) / 3
+    elif simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
         out["fields and their transforms"] = (parts - 2) * 2 * 3 * 8.0 * float(np.prod(cells))
     return out
 
