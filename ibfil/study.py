@@ -26,6 +26,8 @@ from .errors import CaseError
 from .members import Member
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from .record import RunFile
 
 FORM = "KEY=V1,V2,...; keys that change together: KEY=V1,V2&OTHER=W1,W2"
@@ -148,21 +150,25 @@ def study_members(case: str, overrides: Sequence[str], settings: Iterable[Settin
     raise CaseError(list(dict.fromkeys(faults)))
 
 
-def numbers(run: RunFile) -> dict[str, float]:
-    """The number of each observable of a run; a vector as NAME_x, NAME_y, NAME_z."""
+def observed(run: RunFile) -> dict[str, np.ndarray]:
+    """The number () or vector (3,) of each observable of a run."""
     import numpy as np
 
     from .observe import observers, summaries
 
     observables = observers(run.case).observables
-    found = summaries(observables, run.time, {name: np.asarray(run.observables[name]) for name in observables})
+    series = {name: np.asarray(run.observables[name]) for name in observables}
+    return {name: np.asarray(one.value, float) for name, one in summaries(observables, run.time, series).items()}
+
+
+def numbers(run: RunFile) -> dict[str, float]:
+    """The same with a vector as NAME_x, NAME_y, NAME_z."""
     out: dict[str, float] = {}
-    for name, summary in found.items():
-        if np.ndim(summary.value):
-            parts = np.atleast_1d(summary.value)
-            out |= {f"{name}_{letter}": float(part) for letter, part in zip("xyz", parts, strict=True)}
+    for name, value in observed(run).items():
+        if value.ndim:
+            out |= {f"{name}_{letter}": float(part) for letter, part in zip("xyz", value, strict=True)}
         else:
-            out[name] = float(summary.value)
+            out[name] = float(value)
     return out
 
 

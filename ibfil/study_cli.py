@@ -27,19 +27,50 @@ def add_studies(add: Callable[..., argparse.ArgumentParser]) -> None:
     sweep.add_argument("--vary", action="append", required=True, metavar="KEY=V1,V2,...", help=VARY)
     sweep.add_argument("--list", action="store_true", help="only list the combinations and their indices")
     sweep.add_argument("--index", type=int, metavar="K", help="run that combination alone: a task of a job array")
+    trade = add("trade", _trade, "error against wall time over settings, with a proved reference and the Pareto front")
+    _common(trade, "trade")
+    trade.add_argument("--vary", action="append", required=True, metavar="KEY=V1,V2,...", help=VARY)
+    trade.add_argument("--observe", metavar="NAME,...", help="errors of what: position, observables (default: all)")
+    trade.add_argument("--repeat", type=_count, default=3, metavar="N", help="runs of each setting, for the noise")
+    trade.add_argument("--budget", type=_duration, metavar="10m", help="stop after this time: 90s, 10m, 2h")
+    trade.add_argument("--for", dest="wanted", type=_error, metavar="1e-3", help="end with the cheapest for this error")
 
 
 def _common(command: argparse.ArgumentParser, kind: str) -> None:
     command.epilog = "Done runs are kept, cut ones gone on with: the same command again finishes a study."
     command.add_argument("words", nargs="+", metavar="CASE [KEY=VALUE ...]", help=CASE)
     command.add_argument("-o", dest="folder", metavar="DIR", help=f"the folder (default: the case's name -{kind})")
-    command.add_argument("--jobs", type=_jobs, default=1, metavar="N", help="runs side by side, one thread each")
+    command.add_argument("--jobs", type=_count, default=1, metavar="N", help="runs side by side, one thread each")
 
 
-def _jobs(text: str) -> int:
+def _count(text: str) -> int:
     if not text.isascii() or not text.isdigit() or not 0 < int(text) <= 4096:
         raise argparse.ArgumentTypeError(f"found {text}; allowed: a whole number from 1 to 4096")
     return int(text)
+
+
+def _duration(text: str) -> float:
+    """Seconds of 90s, 10m, 2h."""
+    scale = {"s": 1.0, "m": 60.0, "h": 3600.0}.get(text[-1:])
+    value = _positive(text[:-1] if scale else text)
+    if value is None:
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: a time such as 90s, 10m or 2h")
+    return value * (scale or 1.0)
+
+
+def _error(text: str) -> float:
+    value = _positive(text)
+    if value is None:
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: a number above 0")
+    return value
+
+
+def _positive(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if 0 < value < 1e12 else None
 
 
 def _begin(arguments: argparse.Namespace, kind: str) -> tuple[str, list[str], Path]:
@@ -94,4 +125,34 @@ def _one(outcome: Any) -> int:
     if not outcome.done:
         raise RunFailed(f"{outcome.member.name}: {outcome.status}: {outcome.message}")
     print(f"{outcome.path}: {outcome.status}")
+    return 0
+
+
+def _trade(arguments: argparse.Namespace) -> int:
+    case, changes, folder = _begin(arguments, "trade")
+    axes = _axes(arguments.vary)
+    from . import trade
+
+    made = trade.trade(
+        case,
+        axes,
+        folder,
+        changes,
+        observe=arguments.observe.split(",") if arguments.observe else (),
+        repeat=arguments.repeat,
+        budget=arguments.budget,
+        jobs=arguments.jobs,
+        say=_say,
+    )
+    _print_table(trade.rows(made), ("message",))
+    print(f"{folder / trade.TABLE}, {trade.TOLD}, {trade.FIGURE}")
+    if arguments.wanted is None:
+        return 0
+    best = made.cheapest(arguments.wanted)
+    if best is None:
+        raise RunFailed(
+            f"no setting comes within {arguments.wanted:g} in {', '.join(made.measures)}",
+            advice="vary other keys, or shorter steps; the reference's own error is part of what is asked",
+        )
+    print(" ".join(best.setting.overrides))
     return 0
