@@ -23,6 +23,7 @@ from .turns import Reduced, RodStiffness
 
 _EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself
 _LOOSE = 1e-6  # and where it is not: less than Newton gains in an iteration by the time it stops
+_STIRRED = 0.01  # of that with torques: those that hold a turn, and turns in radians, outweigh moves by so much
 _MOST = 5 * 60  # products of a solve, before it is given up
 
 
@@ -232,6 +233,7 @@ class StokesByKrylov(StokesByFFT):
     def __init__(self, fluid: Immersed, solver: Solver, worth: float, alpha: float = 0.0) -> None:
         super().__init__(fluid, solver, alpha)
         self._kept = krylov.Kept(worth)
+        self._loose = _LOOSE if fluid.coupling.vectors == 1 else _STIRRED * _LOOSE
         self._source: _Source | None = None
 
     def solve(self, response: _Fourier, statement: Reduced, product: krylov.Product, right: np.ndarray) -> np.ndarray:
@@ -243,7 +245,7 @@ class StokesByKrylov(StokesByFFT):
             if fresh:
                 self._make(_Source(response.nodes, response.tau, statement.frozen()))
             assert kept.blocks is not None
-            found = krylov.solve(product, right, kept.blocks, _LOOSE, _MOST if fresh else kept.patience)
+            found = krylov.solve(product, right, kept.blocks, self._loose, _MOST if fresh else kept.patience)
             kept.now += found.products
             if found.found or fresh:
                 return _checked(found)
