@@ -316,6 +316,14 @@ def coupling(case: Case, stacked: Stacked) -> Coupling:
     return Stirring(np.where(twists > 0, spin, 1.0), twists)
 
 
+def own_mobility(case: Case, stacked: Stacked, grid: Grid) -> np.ndarray:
+    """What each node moves by its own force or torque beyond the grid's answer, (n, c): slip, and spin below h."""
+    from . import immersed
+
+    slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, case.fluid.viscosity, stacked.spacing)
+    return coupling(case, stacked).own(slip)
+
+
 def spacing(case: Case) -> float:
     """The grid's h. Raises CaseError where ``thickness`` has none."""
     assert case.fluid.box is not None

@@ -38,6 +38,7 @@ class Camera:
         self.case, self.fluid, self.grid = case, fluid, grid
         self._rods, self._mechanics = rods, rods.mechanics
         self._fields: GridFields | None = None
+        self._heat = any(one.kind == "dissipation" for one in case.observe.values())
 
     def frame(self, now: Moment, fields: Sequence[str] = ()) -> Frame:
         """All filaments with diagnostics, and the ``fields`` named."""
@@ -98,17 +99,39 @@ class Camera:
         if self.grid is not None and self.case.output.probes:
             points = np.array(self.case.output.probes)
             out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, shape.e3, force, now.state.time)
+        if self._heat:
+            out |= self._dissipation(now)
         contact = self._rods.contact
         if contact is not None:
             out |= {"contacts": float(contact.near(shape.r).i.size), "first_contact": contact.since}
         return out
 
-    def _grid_fields(self, fields: Sequence[str], now: Moment) -> dict[str, np.ndarray]:
-        """Fields on the grid: one evaluation of the fluid."""
+    def _dissipation(self, now: Moment) -> dict[str, float | np.ndarray]:
+        """What the fluid turns into heat: F.(u - u0) of drag; eta int |grad u|^2 of a grid, and the nodes' side."""
+        force, shape, time = now.force, now.state.shape, now.state.time
+        if self.grid is None:
+            flow = assemble.flow(self.case)
+            carried = 0.0 if flow is None else float(np.sum(force[:, :3] * flow(shape.r, time)))
+            return {"dissipation": float(np.sum(now.velocity * force)) - carried}
+        heat, power = self._grid().dissipation(*self._pushes(now))
+        own = assemble.own_mobility(self.case, self._rods, self.grid)
+        slip = float(np.sum(own * force[:, : own.shape[1]] ** 2))
+        return {"dissipation": heat, "grid_power": power, "slip_power": slip}
+
+    def _grid(self) -> GridFields:
+        """What makes fields, made when it is first asked for."""
         assert self.grid is not None
         if self._fields is None:
             self._fields = assemble.fields(self.case, self.fluid, self.grid)
+        return self._fields
+
+    def _pushes(self, now: Moment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The stencils of the nodes, and the vectors that they put onto the grid."""
+        assert self.grid is not None
         base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
         coupling = assemble.coupling(self.case, self._rods)
-        pushes = coupling.lift(coupling.axes(now.state.shape.e3), now.force)
-        return self._fields.evaluate(base, weights, pushes, now.state.time, fields)
+        return base, weights, coupling.lift(coupling.axes(now.state.shape.e3), now.force)
+
+    def _grid_fields(self, fields: Sequence[str], now: Moment) -> dict[str, np.ndarray]:
+        """Fields on the grid: one evaluation of the fluid."""
+        return self._grid().evaluate(*self._pushes(now), now.state.time, fields)

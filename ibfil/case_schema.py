@@ -191,6 +191,7 @@ class Observe(Table):
         "force",
         "torque",
         "power",
+        "dissipation",
         "efficiency",
     ] = Field(description="what is taken", examples=["speed"])
     filament: str = Field("", description="name of a filament; needed where there are several")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .grid import Grid, project, spread
+from .grid import Grid, interpolate, project, spread
 from .stirring import curl, half_curl
 from .transforms import VectorTransform
 
@@ -51,6 +51,33 @@ class GridFields:
             half_curl(u, *self._axes, spin)
             out["vorticity"] = self._real(2 * spin, self._background_curl(time))
         return out
+
+    def dissipation(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> tuple[float, float]:
+        """eta int |grad u|^2 of the rods' flow, from its modes, and the power F.u (+ T.w) of the nodes upon it.
+
+        In Stokes they are the same number, spreading and interpolation being adjoint; with inertia what is between
+        them goes into the flow's kinetic energy.
+        """
+        modes = self._modes(base, weights, force[:, :3])
+        if force.shape[1] == 6:
+            half_curl(self._modes(base, weights, force[:, 3:]), *self._axes, modes)
+        u, t = self._velocity(modes), self._transform
+        sx, sy, sz = self._squares
+        square = sx[:, None, None] + sy[None, :, None] + sz[None, None, :]
+        twice = np.full(sz.size, 2.0)  # the half of the modes that is kept stands for both
+        twice[0] = 1.0
+        if t.real.shape[3] % 2 == 0:
+            twice[-1] = 1.0
+        heat = float(np.sum((np.abs(u) ** 2).sum(axis=0) * square * twice))
+        turns = np.zeros_like(u)
+        if force.shape[1] == 6:
+            half_curl(u, *self._axes, turns)
+        t.modes[:] = u
+        power = float(np.sum(interpolate(base, weights, t.backward()) * force[:, :3]))
+        if force.shape[1] == 6:
+            t.modes[:] = turns
+            power += float(np.sum(interpolate(base, weights, t.backward()) * force[:, 3:]))
+        return self.viscosity * float(np.prod(self.grid.box)) * heat, power
 
     def _velocity(self, force: np.ndarray) -> np.ndarray:
         """The velocity's modes from those of the force density, which are lost."""

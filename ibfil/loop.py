@@ -158,15 +158,21 @@ class Loop:
                     if self._frame is None or simulation.time > self._frame.time:
                         self._output(simulation.frame())
                     return "stopped", str(stopped)
-            frame = simulation.frame(self._fields(due))
-            if due.fields and frame.grid and self._recorder is not None:
-                self._recorder.append_fields(frame.time, frame.grid)
-            if due.output:
-                self._output(frame)
-                reason = self._rules.check(frame.time)
-                if reason:
-                    return "stopped", reason
+            with self._pace.paused():
+                reason = self._look(due)
+            if reason:
+                return "stopped", reason
         return "finished", ""
+
+    def _look(self, due: Due) -> str:
+        """What is due now; the stop rule that is true, if one is."""
+        frame = self.simulation.frame(self._fields(due))
+        if due.fields and frame.grid and self._recorder is not None:
+            self._recorder.append_fields(frame.time, frame.grid)
+        if not due.output:
+            return ""
+        self._output(frame)
+        return self._rules.check(frame.time)
 
     def _output(self, frame: Frame) -> None:
         self._frame = frame

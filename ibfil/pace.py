@@ -1,12 +1,14 @@
 """How fast a run steps, without its start-up: what `ibfil trade` puts against the error.
 
 The clocks start when the first step of a process is taken, so that loading, compiling and planning are left
-out; the parts of a run that was cut are added up.
+out, and stand still at outputs; the parts of a run that was cut are added up.
 """
 
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 _NAMES = ("pace_seconds", "pace_processor", "pace_time")  # attributes of a run file
@@ -23,6 +25,16 @@ class Pace:
         """Take note of a step that led to ``time``: the first one starts the clocks."""
         if self._from is None:
             self._from = (clock.monotonic(), clock.process_time(), time)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Within it nothing counts."""
+        before = (clock.monotonic(), clock.process_time())
+        yield
+        if self._from is not None:
+            seconds, processor, time = self._from
+            spent = (clock.monotonic() - before[0], clock.process_time() - before[1])
+            self._from = (seconds + spent[0], processor + spent[1], time)
 
     def attributes(self, time: float) -> dict[str, float]:
         """Return what the run file keeps, at simulated ``time``."""

@@ -1,0 +1,104 @@
+"""Power turned into heat: the grid's eta int |grad u|^2 against the nodes' F.u, and what drag turns into heat."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ibfil.case import parse_case
+from ibfil.fields import GridFields
+from ibfil.grid import Grid
+from ibfil.kernels import KERNELS
+from ibfil.loop import Result
+from ibfil.running import run
+
+SCENE = """
+[filament.rod]
+length = 1.0
+nodes = 11
+bending = 1.0
+stretching = 100.0
+shape = { kind = "circle", curvature = 2.0 }
+TWIST
+[fluid]
+model = "stokes"
+viscosity = 0.7
+box = [2.0, 2.0, 1.5]
+cells = [16, 16, 12]
+[time]
+end = 0.01
+step = 1e-3
+[output]
+every = 0.005
+[observe.heat]
+kind = "dissipation"
+summary = "mean"
+"""
+TWISTED = 'twisting = 1.0\nradius = 0.02\ntwist_rate = 1.0\nstart = { end = "clamped", spin = 20.0 }'
+
+
+def ran(*overrides: str, twist: str = "") -> Result:
+    case = parse_case(SCENE.replace("TWIST", twist), "scene.toml", overrides)
+    return run(case, progress=False, log=lambda line: None)
+
+
+@pytest.mark.parametrize("method", ["table", "fft", "krylov"])
+def test_both_sides_are_one_number_in_stokes(method):
+    """To 1e-10; and with the slip's share, the whole power of the nodes but for the positions it is taken at."""
+    found = ran(f"fluid.method={method}").frame.diagnostics
+    assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
+    assert 0 < found["slip_power"] < 0.1 * found["grid_power"]
+    assert found["power"] == pytest.approx(found["grid_power"] + found["slip_power"], rel=0.02)
+
+
+def test_without_slip_it_has_no_share():
+    found = ran("fluid.slip=0").frame.diagnostics
+    assert found["slip_power"] == 0.0
+    assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
+
+
+def test_torques_on_the_grid_do_work_too():
+    found = ran("fluid.rotation=grid", twist=TWISTED).frame.diagnostics
+    assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
+    assert found["power"] == pytest.approx(found["grid_power"] + found["slip_power"], rel=0.02)
+
+
+def test_the_gradient_is_that_of_the_field_itself():
+    """In real space: nine derivatives of the velocity that is put out (single precision), squared and summed."""
+    n = 15
+    grid = Grid([1.0, 1.0, 1.0], [n, n, n])  # odd: every wave has a derivative
+    fields = GridFields(grid, 0.7, None)
+    base, weights = KERNELS["peskin4"].stencil(grid.coordinates(np.array([[0.1, 0.02, -0.3], [-0.2, 0.1, 0.1]])))
+    force = np.array([[1.0, 2.0, -0.5], [-1.0, 0.3, 0.5]])
+    heat, power = fields.dissipation(base, weights, force)
+    u = fields.evaluate(base, weights, force, 0.0, ["velocity"])["velocity"].astype(float)
+    k = 2 * np.pi * np.fft.fftfreq(n, grid.spacing)
+    total = 0.0
+    for axis in range(3):
+        wave = k.reshape([-1 if a == axis else 1 for a in range(3)] + [1])
+        slope = np.fft.ifft(1j * wave * np.fft.fft(u, axis=axis), axis=axis).real
+        total += 0.7 * float(np.sum(slope**2)) * grid.spacing**3
+    assert heat == pytest.approx(power, rel=1e-12)
+    assert heat == pytest.approx(total, rel=1e-5)
+
+
+def test_drag_turns_into_heat_what_the_flow_does_not_carry():
+    assert ran("fluid.model=rft").frame.diagnostics["dissipation"] == pytest.approx(
+        ran("fluid.model=rft").frame.diagnostics["power"]
+    )
+    stream = ran("fluid.model=rft", "fluid.flow=[3, 0, 0]").frame.diagnostics
+    still = ran("fluid.model=rft").frame.diagnostics
+    assert stream["dissipation"] == pytest.approx(still["dissipation"], rel=1e-6)  # Galileo
+
+
+def test_inertia_keeps_some_of_it():
+    """From rest the nodes do more work than is dissipated; the rest is in the flow."""
+    found = ran("fluid.model=navier-stokes", "fluid.density=10").frame.diagnostics
+    assert 0 < found["dissipation"] < 0.9 * found["grid_power"]
+
+
+def test_it_is_an_observable_and_costs_nothing_where_it_is_not_named():
+    result = ran()
+    assert float(result.summaries["heat"].value) > 0
+    silent = parse_case(SCENE.replace("TWIST", "").split("[observe")[0], "scene.toml")
+    assert "dissipation" not in run(silent, progress=False, log=lambda line: None).frame.diagnostics
