@@ -11,14 +11,15 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from . import banded, stepping
+from . import banded, bench_many, bench_threads, stepping
 from .case import parse_case
+from .errors import CaseError
 from .grid import Grid
 from .kernels import KERNELS
 from .mobility import mobility, octant, point_response
@@ -57,7 +58,10 @@ every = 1.2566370614359172
 
 @dataclass(frozen=True)
 class Row:
-    """One measurement: a piece's seconds, its floor's, their ratio, and the bar the ratio is held to (None: none)."""
+    """One measurement: a piece's seconds, its floor's, their ratio, and the bar the ratio is held to (None: none).
+
+    Where ``unit`` says so they are something else than seconds.
+    """
 
     piece: str
     seconds: float
@@ -65,6 +69,7 @@ class Row:
     floor_seconds: float
     ratio: float
     bar: float | None
+    unit: str = "s"
 
     @property
     def verdict(self) -> str:
@@ -119,7 +124,7 @@ def rft_step(nodes: int = 128) -> Row:
     )
 
 
-def _nodes(grid: Grid, kernel: str, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def nodes_and_forces(grid: Grid, kernel: str, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stencils of a wavy line of nodes, and forces on them."""
     x = np.linspace(-0.45, 0.45, count)
     r = np.stack([x, 0.05 * np.sin(14 * x), np.zeros(count)], axis=1)
@@ -130,7 +135,7 @@ def _nodes(grid: Grid, kernel: str, count: int) -> tuple[np.ndarray, np.ndarray,
 def evaluations(cells: int, bars: tuple[float, float]) -> list[Row]:
     """One velocity evaluation of 41 nodes by whole and by pruned FFTs, against the bare transforms."""
     grid = Grid([3.2] * 3, [cells] * 3)
-    base, weights, force = _nodes(grid, "peskin4", 41)
+    base, weights, force = nodes_and_forces(grid, "peskin4", 41)
     whole, pruned = StokesSolve(grid, 1.0), PrunedSolve(grid, 1.0)
 
     def bare() -> None:
@@ -147,7 +152,7 @@ def evaluations(cells: int, bars: tuple[float, float]) -> list[Row]:
 def table_pair(kernel: str, bar: float, count: int = 41) -> Row:
     """One pair of the mobility table, against a microsecond."""
     grid = Grid([3.2] * 3, [64] * 3)
-    base, weights, _ = _nodes(grid, kernel, count)
+    base, weights, _ = nodes_and_forces(grid, kernel, count)
     table, slip = octant(point_response(grid, 1.0), weights.shape[2]), np.zeros(count)
     mobility(table, grid.cells, base, weights, slip)
     seconds = statistics.median(
@@ -208,14 +213,62 @@ def table(rows: list[Row]) -> str:
     for row in rows:
         bar = "" if row.bar is None else f"bar {row.bar:.3g} {row.verdict}"
         lines.append(
-            f"{row.piece}\n    {row.seconds:.3g} s; {row.floor} {row.floor_seconds:.3g} s; ratio {row.ratio:.3g}  {bar}"
+            f"{row.piece}\n    {row.seconds:.3g} {row.unit}; {row.floor} {row.floor_seconds:.3g} {row.unit}; "
+            f"ratio {row.ratio:.3g}  {bar}"
         )
     return "\n".join(lines)
 
 
-def main(json: bool = False) -> int:
-    """Measures everything, a minute or two; prints a table, or JSON. Returns 0: a busy machine is no failure."""
-    rows = [rft_step(), *evaluations(64, (1.15, 1 / 3.5)), *evaluations(128, (1.3, 1 / 5))]
-    rows += [table_pair("peskin4", 1.0), table_pair("bkp6", 4.5), start_up(), *swimmers()]
+def many(cells: tuple[int, ...] = (64, 128), steps: int = 4) -> list[Row]:
+    """Time a node at 10,000 nodes against that at 1,000, and memory against 2 GiB and against what `check` tells."""
+    rows, limit = [], 2.0 * 2**30
+    for n in cells:
+        for nodes, few, lots in bench_many.PAIRS:
+            small, large = (bench_many.measured(count, nodes, n, steps) for count in (few, lots))
+            a, b = (f"{count} x {nodes}, {n}^3" for count in (lots, few))
+            how = ", ".join(f"{x['products']:.0f}" for x in (large, small))
+            piece, ratio = (
+                f"{a}: a node and step ({large['method']}, products {how})",
+                large["seconds"] / small["seconds"],
+            )
+            rows.append(Row(piece, large["seconds"], b, small["seconds"], ratio, 3.0))
+            peak, told = large["peak"], large["told"]
+            rows.append(Row(f"{a}: peak memory", peak, "2 GiB", limit, peak / limit, 1.0, "B"))
+            rows.append(Row(f"{a}: peak memory", peak, "told by check", told, peak / told, None, "B"))
+    return rows
+
+
+def threads() -> list[Row]:
+    """Two threads against one on a busy machine."""
+    return [Row(**row) for row in bench_threads.measured()]
+
+
+PARTS: dict[str, Callable[[], list[Row]]] = {
+    "pieces": lambda: [
+        rft_step(),
+        *evaluations(64, (1.15, 1 / 3.5)),
+        *evaluations(128, (1.3, 1 / 5)),
+        table_pair("peskin4", 1.0),
+        table_pair("bkp6", 4.5),
+        start_up(),
+    ],
+    "swimmer": lambda: swimmers(),
+    "large": lambda: evaluations(256, (1.3, 1 / 6)),
+    "threads": threads,
+    "many": lambda: many(),
+}
+USUAL = ("pieces", "swimmer")
+
+
+def main(json: bool = False, parts: Sequence[str] = ()) -> int:
+    """Measures the parts asked for and prints a table, or JSON. Returns 0: a busy machine is no failure.
+
+    The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB.
+    Raises CaseError for a part there is not.
+    """
+    for part in set(parts) - set(PARTS):
+        raise CaseError([f"bench: found {part}; allowed: {', '.join(PARTS)}"])
+    parts = parts or USUAL
+    rows = [row for part in parts for row in PARTS[part]()]
     print(json_format.dumps([asdict(row) for row in rows], indent=1) if json else table(rows))
     return 0

@@ -118,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("cases", nargs="*", metavar="CASE")
     verify.add_argument("--quick", action="store_true", help="the quick form of each case")
     bench = add("bench", _bench, "time the pieces of a step against floors measured in the same run")
+    bench.add_argument("parts", nargs="*", metavar="PART", help="pieces, swimmer (the usual two), large, threads, many")
     bench.add_argument("--json", action="store_true", help="as JSON")
     return parser
 
@@ -305,5 +306,5 @@ def _bench(arguments: argparse.Namespace) -> int:
     set_threads(1)
     from . import bench
 
-    bench.main(json=arguments.json)
+    bench.main(json=arguments.json, parts=arguments.parts)
     return DONE

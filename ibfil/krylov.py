@@ -92,12 +92,15 @@ def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float,
         rtol=tolerance,
         atol=0.0,
         restart=min(most, _CYCLE),
-        maxiter=max(1, most // _CYCLE),
+        maxiter=-(-most // _CYCLE),
         callback=errors.append,
         callback_type="pr_norm",
     )
     found = bool(np.isfinite(z).all()) and (not failed or errors[-1] < _WORST)
     return Solution(blocks.scale * z, count, found)
+
+
+_COUNTS = ("tau", "age", "before", "now", "fresh", "life", "made")  # of a Kept, that a run's state holds
 
 
 @dataclass
@@ -116,12 +119,13 @@ class Kept:
     age: int = 0  # rounds ended since it was made
     before: int = 0  # products of those rounds
     now: int = 0  # products of the present round
+    fresh: int = 0  # products of the first solve with it
     life: int = 1  # rounds after which it is made anew
     made: int = 0  # how often it was
 
     def renew(self, blocks: Blocks, tau: float) -> None:
         """Puts new factors in; a round begins."""
-        self.blocks, self.tau, self.age, self.before, self.now = blocks, tau, 0, 0, 0
+        self.blocks, self.tau, self.age, self.before, self.now, self.fresh = blocks, tau, 0, 0, 0, 0
         self.made += 1
 
     def end_round(self) -> bool:
@@ -145,19 +149,21 @@ class Kept:
     @property
     def patience(self) -> int:
         """The products after which a solve is better gone on with by new factors."""
-        return int(min(_CYCLE, self.worth + 20))
+        return self.fresh + int(min(_CYCLE, self.worth + 10))
 
-    def failed(self) -> None:
-        """Told that a solve did not come to its end in that many."""
-        self.life = max(1, self.age)
+    def took(self, solution: Solution) -> None:
+        """Told what came of a solve."""
+        self.now += solution.products
+        self.fresh = self.fresh or solution.products
+        if not solution.found:
+            self.life = max(1, self.age)
 
     def memory(self) -> dict[str, float]:
         """Its counts by name."""
-        return {name: float(getattr(self, name)) for name in ("tau", "age", "before", "now", "life", "made")}
+        return {name: float(getattr(self, name)) for name in _COUNTS}
 
     def recall(self, memory: dict[str, float]) -> None:
         """Takes up what ``memory`` gave."""
         self.tau = float(memory["tau"])
-        self.age, self.before, self.now, self.life, self.made = (
-            int(memory[name]) for name in ("age", "before", "now", "life", "made")
-        )
+        for name in _COUNTS[1:]:
+            setattr(self, name, int(memory[name]))

@@ -246,8 +246,9 @@ class Loop:
     def _guarded(self, work: Callable[[], tuple[str, str]]) -> Result:
         """Do the work, and leave the files as they should be however it ends."""
         try:
-            # Small dense solves on all cores of a busy machine are some forty times slower than on one.
-            with self._signals, threadpool_limits(limits=self.case.compute.threads, user_api="blas"):
+            # Small dense solves on all cores of a busy machine are some forty times slower than on one: threads are
+            # for the transforms.
+            with self._signals, threadpool_limits(limits=1, user_api="blas"):
                 try:
                     status, reason = work()
                 except Interrupted:

@@ -246,10 +246,9 @@ class StokesByKrylov(StokesByFFT):
                 self._make(_Source(response.nodes, response.tau, statement.frozen()))
             assert kept.blocks is not None
             found = krylov.solve(product, right, kept.blocks, self._loose, _MOST if fresh else kept.patience)
-            kept.now += found.products
+            kept.took(found)
             if found.found or fresh:
                 return _checked(found)
-            kept.failed()
             fresh = True
 
     def _make(self, source: _Source) -> None:

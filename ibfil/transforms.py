@@ -13,6 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # else FFTW's threads spin while they wait for a busy core
 import pyfftw
 
 _LIMIT = 20.0  # seconds of planning a transform at the most

@@ -2,10 +2,13 @@
 
 import json
 import math
+import subprocess
+import sys
 
 import pytest
 
-from ibfil import bench
+from ibfil import bench, bench_many
+from ibfil.errors import CaseError
 
 
 @pytest.mark.parametrize(
@@ -31,6 +34,23 @@ def test_the_verdict_follows_the_bar():
     assert bench.Row("a", 2.0, "b", 1.0, 2.0, 1.9).verdict == "over"
     assert bench.Row("a", 2.0, "b", 1.0, 2.0, 2.1).verdict == "ok"
     assert bench.Row("a", 2.0, "b", 1.0, 2.0, None).verdict == ""
+
+
+def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monkeypatch):
+    told = {"seconds": 2e-6, "told": 3e8, "peak": 2.9e8, "products": 40.0, "halved": 0, "method": "krylov"}
+    monkeypatch.setattr(bench_many, "measured", lambda *scene: told)
+    rows = bench.many(cells=(16,), steps=1)
+    assert [row.bar for row in rows] == [3.0, 1.0, None] * 2
+    assert rows[2].ratio == 2.9e8 / 3e8
+    asked = [sys.executable, "-m", "ibfil.bench_many", "2", "8", "16", "1"]
+    found = json.loads(subprocess.run(asked, capture_output=True, check=True, text=True).stdout)
+    assert 0 < found["seconds"] < found["peak"]
+    assert found["method"] == "table"
+
+
+def test_a_part_there_is_not_is_refused():
+    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, swimmer"):
+        bench.main(parts=["pieces", "nope"])
 
 
 def test_json_is_json(monkeypatch, capsys):
