@@ -14,6 +14,7 @@ from .loads import EndMoment
 if TYPE_CHECKING:
     from .assemble import Stacked
     from .case import Case
+    from .case_filament import Filament
     from .fields import GridFields
     from .fluid import Fluid
     from .grid import Grid
@@ -61,9 +62,17 @@ class Camera:
                 strain[where],
                 self._mechanics.stretching[segment] * stretch,
                 *ends,
+                **self._twisting(description, now, where),
             )
         grid = self._grid_fields(fields, now) if fields else None
         return Frame(now.state.time, filaments, self._diagnostics(now), grid)
+
+    def _twisting(self, filament: Filament, now: Moment, where: slice) -> dict[str, np.ndarray]:
+        """The twist torque and the spin (N, 3) of a filament that twists, by name."""
+        if filament.twisting is None:
+            return {}
+        e3 = now.state.shape.e3[where]
+        return {"torque": now.force[where, 3:] * e3, "spin": now.velocity[where, 3:] * e3}
 
     def _nodal_moment(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""

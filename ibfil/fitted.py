@@ -190,7 +190,7 @@ class Efficiency(OfFilament, kind="efficiency"):
         """Return the efficiency since the start of `over`."""
         filament, time = self.look(frame), frame.time
         centroid = self.share @ filament.position
-        power = float(np.sum(filament.force * filament.velocity))
+        power = float(np.sum(filament.power))
         last, self._before = self._before, (time, power)
         if self._begin is None:
             if self.over is None or time >= self.over[0] - 1e-9 * abs(time):

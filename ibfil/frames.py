@@ -22,6 +22,14 @@ class FilamentFrame:
     tension: np.ndarray  # (N - 1,) EA (|d|/ds - 1), positive when stretched
     reaction_start: np.ndarray | None  # (3,) force of the support on the node at s = 0, where it is held
     reaction_finish: np.ndarray | None  # (3,) the same at s = L
+    torque: np.ndarray | None = None  # (N, 3) twist torque on the fluid, per node; None where it does not twist
+    spin: np.ndarray | None = None  # (N, 3) rate at which e1 turns about the tangent, along it; likewise
+
+    @property
+    def power(self) -> np.ndarray:
+        """Power (N,) of each node on the fluid: of its force, and of its twist torque."""
+        power: np.ndarray = (self.force * self.velocity).sum(axis=1)
+        return power if self.torque is None or self.spin is None else power + (self.torque * self.spin).sum(axis=1)
 
 
 @dataclass(frozen=True)

@@ -313,7 +313,7 @@ class Force(OnFluid, kind="force"):
 
 
 class Torque(OnFluid, kind="torque"):
-    """Torque of a window's nodal forces on the fluid about the filament's centroid.
+    """Torque of a window's nodal forces on the fluid about the filament's centroid, twist torques included.
 
     At start or finish: the couple of the support there on the filament, -M(0) or M(L).
     """
@@ -329,11 +329,14 @@ class Torque(OnFluid, kind="torque"):
         if self.end == "finish":
             return self.component(_lab_moment(filament, self.s, -1))
         arms = filament.position - self.share @ filament.position
-        return self.component(np.cross(arms, filament.force)[self.inside].sum(axis=0))
+        torque = np.cross(arms, filament.force)
+        if filament.torque is not None:
+            torque = torque + filament.torque
+        return self.component(torque[self.inside].sum(axis=0))
 
 
 class Power(Windowed, kind="power"):
-    """Power of a window's nodal forces on the fluid, sum of F.u."""
+    """Power of a window's nodal forces and twist torques on the fluid, sum of F.u + T.w."""
 
     dimension = "force length/time"
     description = "power on the fluid"
@@ -341,7 +344,7 @@ class Power(Windowed, kind="power"):
     def sample(self, frame: Frame) -> Value:
         """At one output."""
         filament = self.look(frame)
-        return float(np.sum(filament.force[self.inside] * filament.velocity[self.inside]))
+        return float(np.sum(filament.power[self.inside]))
 
 
 class Dissipation(Kind, kind="dissipation"):

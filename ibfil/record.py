@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 FORMAT = "ibfil-run"
 FORMAT_VERSION = 1
-_OPTIONAL = ("reaction_start", "reaction_finish")  # of FilamentFrame: there where that end is held
+# Of FilamentFrame: there where that end is held, and where the filament twists.
+_OPTIONAL = ("reaction_start", "reaction_finish", "torque", "spin")
 _KEYS = ("position", "velocity", "force", "e1", "moment", "strain", "tension", *_OPTIONAL)
 _BLOCK = 256  # outputs read at once by `frames`
 
@@ -148,7 +149,7 @@ class RunFile:
         """Filament -> name -> Column.
 
         position, velocity, force, e1, moment, strain (T, N, 3), tension (T, N-1), and reaction_start,
-        reaction_finish (T, 3) where that end is held.
+        reaction_finish (T, 3) where that end is held; torque, spin (T, N, 3) where the filament twists.
         """
         return {name: self._columns(f"filaments/{name}") for name in self._file["filaments"]}
 

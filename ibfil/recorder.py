@@ -48,13 +48,15 @@ _FILAMENT = {
     "tension": ("force", "tension of the segments between nodes, positive when stretched"),
     "reaction_start": ("force", "force of the support on the node at s = 0"),
     "reaction_finish": ("force", "force of the support on the node at s = L"),
+    "torque": ("force length", "twist torque of each node on the fluid, along the tangent"),
+    "spin": ("1/time", "rate at which the first material director turns about the tangent, along it"),
 }
 _DIAGNOSTICS = {
     "net_force": ("force", "total force on the fluid"),
     "net_torque": ("force length", "total torque on the fluid"),
     "stretch_max": ("1", "largest stretch of a segment, length over rest length minus 1"),
     "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
-    "power": ("force length/time", "power of the nodal forces on the fluid, sum of F.u"),
+    "power": ("force length/time", "power of the nodal forces and twist torques on the fluid"),
     "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
     "grid_power": ("force length/time", "power of the nodal forces upon the grid's own flow"),
     "slip_power": ("force length/time", "power lost between nodes and grid: the slip's share"),

@@ -175,7 +175,7 @@ def memory(simulation: Simulation) -> dict[str, float]:
 def _disk(simulation: Simulation) -> float:
     case, n = simulation.case, len(simulation.arclength)
     outputs = len(case.output.times or ()) or case.time.end / (case.output.every or case.time.end) + 1
-    size = outputs * n * 8.0 * 20
+    size = outputs * n * 8.0 * (20 if simulation.mechanics.unknowns == 3 else 26)
     if simulation.grid is not None and case.output.grid_every is not None:
         points = float(np.prod(np.ceil(simulation.grid.cells / case.output.grid_stride)))
         size += (case.time.end / case.output.grid_every + 1) * points * 12.0 * len(case.output.fields)

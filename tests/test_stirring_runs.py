@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scenes import STOKES, rms, run, scene, slopes, twisting_rod
 
-from ibfil.case import Case
+from ibfil.case import Case, parse_case
 from ibfil.geometry import Geometry
 from ibfil.kernels import PESKIN4
+from ibfil.observe import observers
 from ibfil.report import report
 from ibfil.simulation import Simulation
 
@@ -210,3 +211,20 @@ def test_a_filament_that_does_not_twist_is_carried_and_gives_no_torque():
 def test_methods_that_know_no_torques_are_refused_and_never_chosen():
     simulation = Simulation(scene({"rod": {**STRAIGHT, "radius": 0.02}}, STIRRED))
     assert set(simulation.method_seconds) == {"table", "fft", "krylov"}
+
+
+def test_frames_hold_the_torque_and_the_spin_and_their_power():
+    """All of a spun straight rod's power is its torque's; so is the diagnostic, and the observables count it."""
+    simulation = spun(0.3 * SPUN)
+    frame = simulation.frame()
+    rod = frame.filaments["rod"]
+    assert rod.torque.sum(axis=0) == pytest.approx(frame.diagnostics["net_torque"], abs=1e-12)
+    assert rod.spin == pytest.approx(np.tile([0, 0, 1.0], (16, 1)), abs=1e-9)
+    assert rod.power.sum() == pytest.approx(rod.torque[:, 2].sum(), rel=1e-9)
+    assert rod.power.sum() == pytest.approx(frame.diagnostics["power"], rel=1e-12)
+    text = simulation.case.text + "".join(f'\n[observe.{k}]\nkind = "{k}"\n' for k in ("torque", "power"))
+    looking = observers(parse_case(text, "spun.toml"))
+    looking.take(frame)
+    observed = {k: looking.summaries()[k].value for k in ("torque", "power")}
+    assert observed["torque"] == pytest.approx(frame.diagnostics["net_torque"], abs=1e-12)
+    assert observed["power"] == pytest.approx(frame.diagnostics["power"], rel=1e-12)
