@@ -113,6 +113,16 @@ def _parser() -> argparse.ArgumentParser:
     vtk.add_argument(
         "--watch", type=_seconds, nargs="?", const=5.0, metavar="SECONDS", help="follow a run until it ends (5 s)"
     )
+    render = add("render", _render, "draw a run without a display: a picture (png) or a film (mp4, gif)")
+    render.add_argument("run", metavar="RUN.h5")
+    render.add_argument("-o", dest="output", metavar="FILE", required=True, help="film.mp4, film.gif or picture.png")
+    render.add_argument("--colour", default="tension", metavar="WHAT", help="tension, moment, curvature, speed ...")
+    render.add_argument("--flow", default="none", metavar="HOW", help="none, slice, glyphs or streamlines")
+    render.add_argument("--montage", type=int, default=0, metavar="N", help="N shapes over the run in one picture")
+    render.add_argument("--time", type=float, metavar="T", help="of a picture (default: the last)")
+    render.add_argument("--size", type=_size, default=(1280, 960), metavar="WxH", help="in pixels (1280x960)")
+    render.add_argument("--fps", type=float, default=25.0, metavar="N", help="pictures a second of a film (25)")
+    render.add_argument("--every", type=int, default=1, metavar="N", help="show every N-th output only")
     add_studies(add)
     verify = add("verify", _verify, "run shipped or given cases and hold their [expect] numbers against the result")
     verify.add_argument("cases", nargs="*", metavar="CASE")
@@ -128,6 +138,14 @@ def _count(text: str) -> int:
     if len(text) != 1 or not text.isdecimal():
         raise argparse.ArgumentTypeError(f"found {text}; allowed: 0 to 9")
     return int(text)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """WIDTHxHEIGHT."""
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal() and len(text) < 12):
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: WIDTHxHEIGHT, as 1280x960")
+    return int(width), int(height)
 
 
 def _seconds(text: str) -> float:
@@ -291,6 +309,15 @@ def _vtk(arguments: argparse.Namespace) -> int:
     more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": _log}
     path = write_vtk(arguments.run, arguments.folder, **more)
     print(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
+    return DONE
+
+
+def _render(arguments: argparse.Namespace) -> int:
+    from .render import Wish, render
+
+    a = arguments
+    wish = Wish(a.colour, a.flow, a.montage, a.time, a.size, a.fps, a.every)
+    print(render(a.run, a.output, wish, _log))
     return DONE
 
 
