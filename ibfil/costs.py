@@ -58,6 +58,16 @@ def factored(nodes: int, parts: int = 3) -> float:
     return 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1.0) + solved(nodes, parts)
 
 
+def of_rods(case: Case, nodes: int, scheme: str = "") -> float:
+    """Seconds a step takes for the rods alone, in the case's scheme or another."""
+    return _ROUNDS[scheme or case.time.scheme] * nodes * _NODE
+
+
+def of_inertia(cells: Sequence[int], stirs: bool) -> float:
+    """Seconds a step for a fluid's past and advection: components through FFTs, whatever answers to the forces."""
+    return 1.2 * (8 + 6 * (2 if stirs else 1)) / 6 * full_evaluation(cells)
+
+
 def seconds_a_step(
     case: Case,
     rods: Sequence[int],
@@ -71,7 +81,7 @@ def seconds_a_step(
     whether torques go onto the grid too. The table is out where it does not fit.
     """
     rounds, nodes = _ROUNDS[case.time.scheme], sum(rods)
-    local = rounds * nodes * _NODE
+    local = of_rods(case, nodes)
     if cells is None or sizes is None:
         return {"rft": local}
     if case.fluid.model == "navier-stokes":
@@ -100,7 +110,7 @@ def _with_inertia(case: Case, stirs: bool, rods: Sequence[int], cells: Sequence[
     rounds, nodes, parts = _ROUNDS[case.time.scheme], sum(rods), 4 if stirs else 3
     vectors, build = parts - 2, 0.5 * nodes**2 * _PAIR * (_COMPONENTS if stirs else 1)
     full = vectors * (full_evaluation(cells) + nodes * _SPREAD)
-    local = rounds * nodes * _NODE + 1.2 * (8 + 6 * vectors) / 6 * full_evaluation(cells)
+    local = of_rods(case, nodes) + of_inertia(cells, stirs)
     if case.time.scheme == "explicit":
         return {"table": local + build, "fft": local + full}
     exact = build + rounds * solved(nodes, parts)

@@ -11,6 +11,7 @@ from .case import idle_keys
 from .case_schema import Matched
 from .groups import groups, warnings
 from .simulation import Simulation
+from .terms import shares, terms
 
 if TYPE_CHECKING:
     from .case import Case
@@ -24,6 +25,7 @@ def report(case: Case) -> str:
     parts += _section("modelled", modelled(case))
     parts += _section("not modelled", absent(case))
     parts += _section("dimensionless groups", [f"{k} = {v:.4g}" for k, v in groups(simulation).items()])
+    parts += _section("share of a step and of memory, from counts", share_lines(simulation))
     parts += _section("size and cost", _costs(simulation))
     parts += _section("step", _steps(simulation))
     idle = idle_keys(case)
@@ -133,6 +135,13 @@ def absent(case: Case) -> list[str]:
     whose = "of the rod beyond the fluid it displaces" if case.fluid.model == "navier-stokes" else "of rod and fluid"
     out.append(f"inertia {whose}; walls; heads; closed rods")
     return out
+
+
+def share_lines(simulation: Simulation) -> list[str]:
+    """Each term with its share of time and of memory."""
+    found = shares(terms(simulation, memory(simulation)))
+    width = max(len(name) for name, _, _ in found)
+    return [f"{name:{width}}  {100 * time:5.1f} % of time  {100 * size:5.1f} % of memory" for name, time, size in found]
 
 
 def _bytes(count: float) -> str:

@@ -34,6 +34,16 @@ def add_studies(add: Callable[..., argparse.ArgumentParser]) -> None:
     trade.add_argument("--repeat", type=_count, default=3, metavar="N", help="runs of each setting, for the noise")
     trade.add_argument("--budget", type=_duration, metavar="10m", help="stop after this time: 90s, 10m, 2h")
     trade.add_argument("--for", dest="wanted", type=_error, metavar="1e-3", help="end with the cheapest for this error")
+    compare = add("compare", _compare, "one scene under several fluids: table, CSV and a figure")
+    _common(compare, "compare")
+    compare.add_argument(
+        "--fluids",
+        metavar="rft,stokes,...",
+        default="rft,matched,stokes",
+        help="rft, matched (drag of the grid), slender, stokes, navier-stokes (default: %(default)s)",
+    )
+    compare.add_argument("--period", type=_error, metavar="T", help="of the motion (default: of what drives it)")
+    compare.add_argument("--transient", type=_error, metavar="T", help="left out at the start (default: a third)")
 
 
 def _common(command: argparse.ArgumentParser, kind: str) -> None:
@@ -156,3 +166,45 @@ def _trade(arguments: argparse.Namespace) -> int:
         )
     print(" ".join(best.setting.overrides))
     return 0
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    case, changes, folder = _begin(arguments, "compare")
+    from . import compare
+
+    made = compare.compare(
+        case,
+        arguments.fluids.split(","),
+        folder,
+        changes,
+        period=arguments.period,
+        transient=arguments.transient,
+        jobs=arguments.jobs,
+        say=_say,
+    )
+    _print_comparison(made)
+    print(f"{folder / compare.TABLE}, {compare.TOLD}, {compare.FIGURE}")
+    return 0 if all(column.outcome.done for column in made.columns) else 1
+
+
+def _print_comparison(made: Any) -> None:
+    """The table for the eye, and what each fluid models that not all do."""
+    from .show import table
+
+    def cell(found: Any) -> str:
+        if found is None:
+            return "-"
+        return f"{found.value:.4g}" + ("" if found.error is None else f" +- {found.error:.1g}")
+
+    names = list(dict.fromkeys(key for column in made.columns for key in column.numbers))
+    lines = [["", *(column.fluid for column in made.columns)]]
+    lines += [[name, *(cell(column.numbers.get(name)) for column in made.columns)] for name in names]
+    print("\n".join(table(lines)))
+    window = made.window
+    print(f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}")
+    for column in made.columns:
+        for line in column.own or (column.outcome.message or "nothing that the others do not model",):
+            print(f"  {column.fluid}: {line}")
+    for column in made.columns:
+        for line in column.shares:
+            print(f"  {column.fluid}: {line}")

@@ -1,0 +1,82 @@
+"""What each modelled term takes of a step and of memory, from counts: part of `ibfil check` and `ibfil compare`.
+
+Only what a case names is in the list, because only that is built. Shares of time are of one step, outputs spread over
+the steps between them; that of the rods and of the fluid are those by which the method is chosen (costs.py), the rest
+was measured against them: twisting 0.7 of what bending and stretching take, contact 1.5, noise 0.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import assemble, costs
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+_TWISTING = 0.7  # of the step of bending and stretching
+_CONTACT, _NOISE = 1.5, 0.1  # the same of an implicit one
+_DRAG = 0.05
+_FIELDS = "fields and their transforms"
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of the model: seconds a step and bytes, from counts."""
+
+    name: str
+    seconds: float
+    bytes: float
+
+
+def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
+    """Return every term that the case names; ``memory`` are bytes of large arrays by what they are for."""
+    case, n = simulation.case, len(simulation.arclength)
+    unknowns, band = simulation.mechanics.unknowns, memory["band matrix"]
+    rods, implicit = costs.of_rods(case, n), costs.of_rods(case, n, "implicit")
+    out = [Term("bending and stretching", rods, band * 9 / unknowns**2)]
+    if unknowns == 4:
+        out.append(Term("twisting", _TWISTING * rods, band * 7 / 16))
+    if case.contact is not None:
+        out.append(Term("contact", _CONTACT * implicit, 8.0 * 30 * n))
+    if case.thermal is not None:
+        out.append(Term("thermal noise", _NOISE * implicit, 8.0 * unknowns * n))
+    if simulation.grid is None:
+        return [*out, Term("drag of each node", _DRAG * rods, 8.0 * 3 * n)]
+    return [*out, *_of_grid(simulation, memory)]
+
+
+def _of_grid(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
+    """The fluid on the grid; with inertia its past and advection apart; and what is put out of it."""
+    case, grid = simulation.case, simulation.grid
+    assert grid is not None
+    cells, out = grid.cells.tolist(), []
+    seconds = simulation.method_seconds[simulation.method] - costs.of_rods(case, len(simulation.arclength))
+    fields, used = memory.get(_FIELDS, 0.0), {k: v for k, v in memory.items() if k not in ("band matrix", _FIELDS)}
+    if case.fluid.model == "navier-stokes":
+        past = min(seconds, costs.of_inertia(cells, assemble.stirs(case)))
+        held = sum(size for name, size in used.items() if "past" in name or "transforms" in name)
+        out.append(Term("inertia and advection", past, held))
+        seconds, used = seconds - past, {"rest": sum(used.values()) - held}
+    puts_out = case.output.grid_every is not None
+    size = sum(used.values()) + (0.0 if puts_out else fields)
+    stirring = ", torques too" if assemble.stirs(case) else ""
+    out.insert(0, Term(f"flow between nodes{stirring} ({simulation.method})", seconds, size))
+    look, step = costs.full_evaluation(cells), simulation.step_length
+    if case.output.grid_every is not None:
+        out.append(Term("fields put out", len(case.output.fields) * look * step / case.output.grid_every, fields))
+    if any(one.kind == "dissipation" for one in case.observe.values()):
+        every = case.output.every or case.time.end / max(len(case.output.times or ()), 1)
+        out.append(
+            Term("dissipation looked at", 1.5 * look * step / every, 0.0 if fields else 6 * 8.0 * float(np.prod(cells)))
+        )
+    return out
+
+
+def shares(found: list[Term]) -> list[tuple[str, float, float]]:
+    """Return (name, share of time, share of memory) of each term."""
+    time, size = sum(term.seconds for term in found), sum(term.bytes for term in found)
+    return [(term.name, term.seconds / time, term.bytes / size) for term in found]

@@ -1,0 +1,154 @@
+"""Only what the scene requires: what a case does not name is not built, not called, not allocated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ibfil import assemble, fields, loop, mechanics, thermal, transforms
+from ibfil.case import parse_case
+from ibfil.contact import Contact
+from ibfil.report import memory, report
+from ibfil.running import run
+from ibfil.simulation import Simulation
+from ibfil.terms import shares, terms
+
+SCENE = """
+[filament.rod]
+length = 1.0
+nodes = 9
+derivative = 2
+bending = 1.0
+stretching = 100.0
+shape = { kind = "circle", curvature = 1.0 }
+[fluid]
+model = "rft"
+viscosity = 1.0
+box = [2.0, 2.0, 2.0]
+cells = [16, 16, 16]
+[time]
+end = 0.01
+step = 1e-3
+[output]
+every = 0.002
+"""
+GRID = ("fluid.model=stokes",)
+ALL = ("filament.rod.twisting=1.0", "filament.rod.radius=0.01", "thermal.energy=1e-9", "contact.action=warn")
+
+
+def case(*overrides: str):
+    return parse_case(SCENE, "scene.toml", overrides)
+
+
+def ran(*overrides: str):
+    return run(case(*overrides), progress=False, log=lambda line: None)
+
+
+class Counter:
+    """Counts the calls of a function that it stands in for."""
+
+    def __init__(self, monkeypatch, place, name: str) -> None:
+        self.calls = 0
+        inner = getattr(place, name)
+
+        def counted(*given, **named):
+            self.calls += 1
+            return inner(*given, **named)
+
+        monkeypatch.setattr(place, name, counted)
+
+
+def test_no_fft_plan_in_rft(monkeypatch):
+    plans = Counter(monkeypatch, transforms.VectorTransform, "__init__")
+    ran()
+    assert plans.calls == 0
+    ran(*GRID, "fluid.method=fft")
+    assert plans.calls > 0  # the same counter where there is one
+
+
+def test_the_table_steps_without_a_transform_of_the_grid(monkeypatch):
+    plans = Counter(monkeypatch, transforms.VectorTransform, "__init__")
+    ran(*GRID, "fluid.method=table")
+    assert plans.calls == 0
+
+
+def test_no_random_numbers_without_thermal_forces(monkeypatch):
+    drawn = Counter(monkeypatch, np.random, "default_rng")
+    noise = Counter(monkeypatch, thermal.Noise, "__init__")
+    ran()
+    ran(*GRID)
+    assert drawn.calls == noise.calls == 0
+    ran(*ALL)
+    assert noise.calls == 1
+
+
+def test_no_twist_unknowns_without_twisting():
+    plain, twisted = Simulation(case()), Simulation(case(*ALL[:2]))
+    assert plain.mechanics.unknowns == 3
+    assert plain.state()["velocity"].shape == (9, 3)
+    assert twisted.mechanics.unknowns == 4
+    assert twisted.state()["velocity"].shape == (9, 4)
+
+
+def test_no_jacobian_in_explicit_runs(monkeypatch):
+    jacobians = Counter(monkeypatch, mechanics.Mechanics, "stiffness")
+    explicit = ("time.scheme=explicit", "time.step=1e-5")
+    steps = ran(*explicit).steps + ran(*explicit, *GRID).steps
+    assert jacobians.calls == 2 < steps / 500  # one a run, to warn of a step that will diverge; none a step
+    result = ran()
+    assert jacobians.calls >= result.steps
+
+
+def test_no_field_between_outputs_and_none_where_none_is_put_out(monkeypatch):
+    looks = Counter(monkeypatch, fields.GridFields, "evaluate")
+    made = Counter(monkeypatch, fields.GridFields, "__init__")
+    heat = Counter(monkeypatch, fields.GridFields, "dissipation")
+    ran(*GRID, "fluid.method=table")
+    assert looks.calls == made.calls == heat.calls == 0
+    ran(*GRID, "fluid.method=table", "output.grid_every=0.005")
+    assert looks.calls == 3  # t = 0, 0.005, 0.01; ten steps, six outputs
+    assert made.calls == 1
+    ran(*GRID, "observe.heat.kind=dissipation")
+    assert heat.calls == 7  # one an output, and one frame before the first, for the warnings
+
+
+def test_no_contact_search_without_contact(monkeypatch):
+    looks = Counter(monkeypatch, Contact, "watch")
+    ran()
+    assert looks.calls == 0
+    ran(*ALL[:2], ALL[3])
+    assert looks.calls >= 10
+
+
+def test_no_noise_no_grid_no_drag_calibrated(monkeypatch):
+    calls = [Counter(monkeypatch, assemble, name) for name in ("twist_radius",)]
+    measured = Counter(monkeypatch, loop.checkpoint, "write")
+    ran()
+    assert all(one.calls == 0 for one in calls)
+    assert measured.calls == 0  # nothing is written where no file is asked for
+
+
+def test_check_lists_each_term_with_its_share_and_no_other():
+    plain = shares(terms(Simulation(case()), memory(Simulation(case()))))
+    assert [name for name, _, _ in plain] == ["bending and stretching", "drag of each node"]
+    whole = Simulation(case(*ALL))
+    named = [name for name, _, _ in shares(terms(whole, memory(whole)))]
+    assert named == ["bending and stretching", "twisting", "contact", "thermal noise", "drag of each node"]
+    for simulation in (Simulation(case()), whole, Simulation(case(*GRID, "output.grid_every=0.005"))):
+        found = shares(terms(simulation, memory(simulation)))
+        assert sum(time for _, time, _ in found) == pytest.approx(1.0)
+        assert sum(size for _, _, size in found) == pytest.approx(1.0)
+        assert all(time >= 0 and size >= 0 for _, time, size in found)
+    text = report(case(*GRID))
+    assert "flow between nodes (table)" in text
+    assert "fields put out" not in text
+    inertia = Simulation(case("fluid.model=navier-stokes", "fluid.density=1"))
+    assert "inertia and advection" in [term.name for term in terms(inertia, memory(inertia))]
+
+
+def test_the_sizes_are_those_of_the_terms():
+    """What `check` says of memory is shared out among them: within what is too small for it to list."""
+    for overrides in ((), GRID, (*GRID, "output.grid_every=0.005"), ("fluid.model=navier-stokes", "fluid.density=1")):
+        simulation = Simulation(case(*overrides))
+        listed = memory(simulation)
+        assert sum(term.bytes for term in terms(simulation, listed)) == pytest.approx(sum(listed.values()), rel=0.1)
