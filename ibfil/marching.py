@@ -35,9 +35,12 @@ class Walker(Protocol):
     def may_halve(self, dt: float) -> bool:
         """Whether a step of length dt that failed may be tried again with half of it."""
 
+    def longest_step(self) -> float:
+        """What the fluid's own motion leaves to steps that nobody prescribed; infinite where it has none."""
+
 
 class EvenSteps:
-    """Equal steps no longer than ``length`` from one output to the next."""
+    """Equal steps no longer than ``length``, and than the fluid allows, from one output to the next."""
 
     def __init__(self, length: float) -> None:
         self.length = length
@@ -48,14 +51,20 @@ class EvenSteps:
         """Goes on to exactly ``until``; calls back after each step."""
         start, end, count, done = self._plan
         if end != until or done >= count:
-            start, done = walker.time, 0
-            count = max(1, int(np.ceil((until - start) / self.length * (1 - 1e-9))))
+            start, done, count = walker.time, 0, self._parts(walker, until)
         while done < count:
             goal = until if done + 1 == count else start + (until - start) * ((done + 1) / count)
             self._step_to(walker, goal)
             done += 1
+            if done < count and (until - start) / count > walker.longest_step():
+                start, done, count = walker.time, 0, self._parts(walker, until)
             self._plan = (start, until, count, done)
             after_step()
+
+    def _parts(self, walker: Walker, until: float) -> int:
+        """How many steps there are to ``until``."""
+        length = min(self.length, walker.longest_step())
+        return max(1, int(np.ceil((until - walker.time) / length * (1 - 1e-9))))
 
     def _step_to(self, walker: Walker, goal: float) -> None:
         """One step, or as many halves as it takes."""
@@ -133,6 +142,7 @@ class ControlledSteps:
         rejected = 0
         while True:
             rest = until - walker.time
+            self.length = min(self.length, walker.longest_step())
             parts = max(1, int(np.ceil(rest / self.length * (1 - 1e-9))))
             dt = rest if parts == 1 else min(self.length, rest / 2) if parts == 2 else self.length
             try:

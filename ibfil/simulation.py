@@ -74,6 +74,7 @@ class Simulation:
         )
         self.steps = self._iterations = 0
         self.notices: list[str] = []  # what has happened and nobody was told yet
+        self._told = False  # that the fluid moves too far in a step
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         if self._transforms:
             self._remember()
@@ -241,6 +242,11 @@ class Simulation:
         """
         return 0.5 * dt >= self.case.time.min_step and self.case.time.scheme != "explicit" and self._noise is None
 
+    def longest_step(self) -> float:
+        """What the fluid's own motion leaves to steps that are not given; infinite for those that are."""
+        given = self.case.time.step != "auto" and self.case.time.tolerance is None
+        return np.inf if given else self.fluid.longest_step()
+
     def give_up(self, reason: str, dt: float, node: int | None = None) -> None:
         """Raises RunFailed: no step of length dt can be taken, because of ``node`` if that is known."""
         self._fail(f"{reason} (dt = {dt:.3g})", node, self._advice())
@@ -259,6 +265,7 @@ class Simulation:
         """Takes a step, which led to ``time``. Raises RunFailed where it led out of bounds, Stopped at a contact."""
         before, self.state_now = self.state_now, step.state._replace(time=time)
         self.fluid.advance(step.response, step.force)
+        self._look_at_crossing(time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
         self.steps += 1
         if self.steps > self.case.time.max_steps:
@@ -286,6 +293,16 @@ class Simulation:
                 "more nodes, a shorter time.step, or a slower spin",
             )
         self._watch(before)
+
+    def _look_at_crossing(self, dt: float) -> None:
+        """Tells, once, of a given step in which the fluid moves too far for its extrapolated advection."""
+        longest = self.fluid.longest_step()
+        if dt > longest and not self._told and self.longest_step() == np.inf:
+            self._told = True
+            self.notices.append(
+                f"time.step: at t = {self.time:.4g} the fluid crosses {dt / longest:.2g} cells in a step; advection "
+                f"is extrapolated, stable up to about one: take a step below {longest:.3g}"
+            )
 
     def _watch(self, before: State) -> None:
         """Looks for a contact since ``before``, where the case has [contact]."""
