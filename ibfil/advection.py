@@ -1,46 +1,33 @@
-"""Advection in a periodic box: rho div(u u), projected, its aliases removed (2/3 rule).
+"""Advection in a periodic box: rho div(u u), projected, and kept from aliases by a smooth filter.
 
-Modes with 3 |m| >= n on any axis take no part: then products of the others fall on none of them wrongly, and the form
-of the nonlinear term does not matter. The one here needs least transforms (Basdevant 1983, J. Comput. Phys. 50, 209):
-w^2 is taken off the diagonal of the symmetric u u, which is a pressure, so that five products go forth for three
+The filter exp(-36 (k/k_max)^36) on each axis (Hou & Li 2007, J. Comput. Phys. 226, 379) is put on the velocity that
+is multiplied and on what comes of it. Cutting at two thirds of k_max instead has no aliases at all, but a rod on a
+grid makes flow up to k_max: the swimmer at rho = 100, 64^3 goes at -0.0261 with the cut and -0.0252 with the filter,
+where all modes without aliases (products on 96^3) give -0.0251.
+
+The form of the nonlinear term is the one that needs least transforms (Basdevant 1983, J. Comput. Phys. 50, 209): w^2
+is taken off the diagonal of the symmetric u u, which is a pressure, so that five products go forth for the three
 velocities that came back, where omega x u needs three for six.
-
-Past fields and these are kept as plain reals, pairs of them a mode: loops over them are what compilers vectorise.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
+import numpy as np
 from numba import njit
 
 from .grid import Grid
 
-
-class Band(NamedTuple):
-    """The modes that take part: up to ``most`` (3,) on each axis, either sign; the last axis is halved."""
-
-    most: tuple[int, int, int]
-
-    @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """Of an array that holds them, pairs of reals."""
-        mx, my, mz = self.most
-        return 3, 2 * mx + 1, 2 * my + 1, 2 * (mz + 1)
+PRODUCTS = 5  # components that go forth
+STRENGTH, POWER = 36.0, 36.0
 
 
-def band(grid: Grid) -> Band:
-    """The modes 3 |m| < n of a grid."""
-    mx, my, mz = ((int(n) - 1) // 3 for n in grid.cells)
-    return Band((mx, my, mz))
-
-
-@njit(cache=True, inline="always")
-def place(i, n, most):
-    """Where mode i of n has its place in a band; negative where it has none."""
-    if i <= most:
-        return i
-    return i - (n - 2 * most - 1) if i >= n - most else -1
+def filters(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The filter along each axis, by mode; the last axis is halved."""
+    out = []
+    for axis, n in enumerate(int(n) for n in grid.cells):
+        k = (np.fft.rfftfreq if axis == 2 else np.fft.fftfreq)(n)
+        out.append(np.exp(-STRENGTH * np.abs(2 * k) ** POWER))
+    return out[0], out[1], out[2]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -82,38 +69,21 @@ def products_in(u, flow, fastest):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def divergence(modes, kx, ky, kz, most, scale, out):
-    """scale P div of the products' modes (5, nx, ny, nz//2 + 1) into ``out``, a band; kz one a mode."""
-    nx, ny = modes.shape[1:3]
+def divergence(modes, kx, ky, kz, fx, fy, fz, scale, out):
+    """scale P div of the products' modes (5, nx, ny, nz//2 + 1), filtered, into ``out``, as pairs of reals."""
+    nx, ny, nz = modes.shape[1:]
     for i in range(nx):
-        p = place(i, nx, most[0])
-        if p < 0:
-            continue
         for j in range(ny):
-            q = place(j, ny, most[1])
-            if q < 0:
-                continue
-            a, b = kx[i], ky[j]
-            for k in range(most[2] + 1):
+            a, b, s = kx[i], ky[j], scale * fx[i] * fy[j]
+            for k in range(nz):
                 c = kz[k]
                 square = a * a + b * b + c * c
                 xx, yy, xy = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
                 xz, yz = modes[3, i, j, k], modes[4, i, j, k]
                 u, v, w = a * xx + b * xy + c * xz, a * xy + b * yy + c * yz, a * xz + b * yz
                 f = (a * u + b * v + c * w) / square if square != 0.0 else 0.0 * u
-                u, v, w = scale * (u - a * f), scale * (v - b * f), scale * (w - c * f)
-                out[0, p, q, 2 * k], out[0, p, q, 2 * k + 1] = -u.imag, u.real
-                out[1, p, q, 2 * k], out[1, p, q, 2 * k + 1] = -v.imag, v.real
-                out[2, p, q, 2 * k], out[2, p, q, 2 * k + 1] = -w.imag, w.real
-
-
-@njit(cache=True)
-def cut(modes, most):
-    """Zeros modes (c, nx, ny, nz//2 + 1) outside a band."""
-    nx, ny, nz = modes.shape[1:]
-    for c in range(modes.shape[0]):
-        for i in range(nx):
-            for j in range(ny):
-                inside = place(i, nx, most[0]) >= 0 and place(j, ny, most[1]) >= 0
-                for k in range(most[2] + 1 if inside else 0, nz):
-                    modes[c, i, j, k] = 0.0
+                g = s * fz[k]
+                u, v, w = g * (u - a * f), g * (v - b * f), g * (w - c * f)
+                out[0, i, j, 2 * k], out[0, i, j, 2 * k + 1] = -u.imag, u.real
+                out[1, i, j, 2 * k], out[1, i, j, 2 * k + 1] = -v.imag, v.real
+                out[2, i, j, 2 * k], out[2, i, j, 2 * k + 1] = -w.imag, w.real

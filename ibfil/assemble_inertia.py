@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from . import stokes
-from .navier_stokes import PRODUCTS, Background, NavierStokes, Room
+from .advection import PRODUCTS
+from .navier_stokes import Background, NavierStokes, Room
 from .stirring import StirredSolve
 from .transforms import VectorTransform
 

@@ -1,7 +1,7 @@
 """Fields on the grid of a fluid with inertia: its velocity is at hand, and its pressure carries advection too.
 
 grad p is what f - rho div(u u) is not allowed to have of a gradient:  p = -i k.f/|k|^2 - rho k.(u u)^.k/|k|^2, with
-the products' aliases removed as in advection.py. In a background flow U, which something else drives, u u - U U
+the products filtered as in advection.py. In a background flow U, which something else drives, u u - U U
 stands for u u: the pressure is that of the rods' disturbance.
 """
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .advection import cut
+from .advection import filters
 from .fields import Flow, GridFields
 
 if TYPE_CHECKING:
@@ -33,18 +33,18 @@ class InertialFields(GridFields):
 
     def _dynamic(self) -> np.ndarray:
         """rho k.(u u)^.k/|k|^2, (nx, ny, nz)."""
-        t, k, most = self._transform, self._k, self._fluid.past.band.most
-        t.modes[:] = self._fluid.past.now.view(complex)
-        cut(t.modes, most)
+        t, k, (fx, fy, fz) = self._transform, self._k, filters(self.grid)
+        smooth = fx[:, None, None] * fy[:, None] * fz
+        t.modes[:] = self._fluid.past.now.view(complex) * smooth
         own = t.backward().copy()
-        flow = np.zeros_like(own) if self.flow is None else self._fluid.background(most)
+        flow = np.zeros_like(own) if self.flow is None else self._fluid.background()
         square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
         square[square == 0] = np.inf
         total = np.zeros(square.shape, complex)
         for a in range(3):
             t.real[:] = (own + flow) * (own[a] + flow[a]) - flow * flow[a]
-            cut(t.forward(), most)
-            total += k[a] * (k[0] * t.modes[0] + k[1] * t.modes[1] + k[2] * t.modes[2])
+            t.forward()
+            total += k[a] * (k[0] * t.modes[0] + k[1] * t.modes[1] + k[2] * t.modes[2]) * smooth
         t.modes[:] = 0.0
         t.modes[0] = self._fluid.density / t.size * total / square
         return np.array(t.backward()[0])

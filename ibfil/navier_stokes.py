@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .advection import cut, divergence, products, products_in
+from .advection import PRODUCTS, divergence, filters, products, products_in
 from .fluid import Response
 from .grid import Grid, interpolate, spread
 from .immersed import Flow, Immersed, ImmersedResponse, Nodes
@@ -26,25 +26,26 @@ from .stokes import Tabulated
 from .transforms import VectorTransform
 
 SAME = 1e-9  # steps that differ by less, as the differences of rounded times do, share their operator
-PRODUCTS = 5  # components that go forth for the advection
 KEPT = 2  # operators: Euler's first step has another alpha than BDF2's
 COURANT = 1.0  # cells that the fastest fluid may cross in a step
 
 
 class Background:
-    """A maintained flow on the grid, its aliases cut off; of one moment only where it is ``steady``."""
+    """A maintained flow on the grid, filtered like what it is multiplied with; made once where it is ``steady``."""
 
     def __init__(self, grid: Grid, flow: Flow, steady: bool, threads: int = 1) -> None:
         self._grid, self._flow, self._steady, self._threads = grid, flow, steady, threads
         self._known: tuple[float, np.ndarray] | None = None
 
-    def at(self, time: float, most: tuple[int, int, int]) -> np.ndarray:
-        """The velocity (3, nx, ny, nz) at ``time``, its modes up to ``most``."""
+    def at(self, time: float) -> np.ndarray:
+        """The velocity (3, nx, ny, nz) at ``time``."""
         if self._known is None or not (self._steady or self._known[0] == time):
             nx, ny, nz = (int(n) for n in self._grid.cells)
             transform = VectorTransform((nx, ny, nz), self._threads, "FFTW_ESTIMATE")
             transform.real[:] = self._flow(self._grid.points(), time).T.reshape(3, nx, ny, nz)
-            cut(transform.forward(), most)
+            fx, fy, fz = filters(self._grid)
+            modes = transform.forward()
+            modes *= fx[:, None, None] * fy[:, None] * fz
             self._known = time, transform.backward() / transform.size
         return self._known[1]
 
@@ -141,20 +142,20 @@ class NavierStokes:
         self._advect()
 
     def _advect(self) -> None:
-        """The advection of the velocity whose band the transform holds."""
-        t, most = self.room.flow, self.past.band.most
+        """The advection of the velocity that the transform holds, filtered."""
+        t = self.room.flow
         t.backward()
         if self._background is None:
             self.fastest = products(t.real, 0.0)
         else:
-            self.fastest = products_in(t.real, self.background(most), 0.0)
+            self.fastest = products_in(t.real, self.background(), 0.0)
         waves, _ = self.fluid.grid.wave_numbers()
-        divergence(t.forward(PRODUCTS), *waves, most, self.density / t.size, self.past.n_now)
+        divergence(t.forward(PRODUCTS), *waves, *filters(self.fluid.grid), self.density / t.size, self.past.n_now)
 
-    def background(self, most: tuple[int, int, int]) -> np.ndarray:
-        """The maintained flow (3, nx, ny, nz) now, which there must be; its modes up to ``most``."""
+    def background(self) -> np.ndarray:
+        """The maintained flow (3, nx, ny, nz) now, which there must be; filtered."""
         assert self._background is not None
-        return self._background.at(self.time, most)
+        return self._background.at(self.time)
 
     def longest_step(self) -> float:
         """That in which the fastest fluid crosses COURANT cells."""

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from .advection import band, place
+from .advection import filters
 from .grid import Grid
 
 
@@ -41,13 +41,16 @@ def weights(alpha: float, tau: float, w: float, dt_old: float) -> Weights:
 
 
 class Past:
-    """Velocities (3, nx, ny, 2 (nz//2 + 1)) and advection in its band, pairs of reals, at the last two steps."""
+    """Velocities and advection (3, nx, ny, 2 (nz//2 + 1)) at the last two steps, pairs of reals a mode.
+
+    Real multipliers are then loops over plain reals, which compilers vectorise.
+    """
 
     def __init__(self, grid: Grid) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
-        self.band = band(grid)
-        self.now, self.old = (np.zeros((3, nx, ny, 2 * (nz // 2 + 1))) for _ in range(2))
-        self.n_now, self.n_old = (np.zeros(self.band.shape) for _ in range(2))
+        self.now, self.old, self.n_now, self.n_old = (np.zeros((3, nx, ny, 2 * (nz // 2 + 1))) for _ in range(4))
+        fx, fy, fz = filters(grid)
+        self._f = (fx, fy, np.repeat(fz, 2))
         self.dt_old = 0.0
         (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
         self._k, self._s = (kx, ky, np.repeat(kz, 2)), (sx, sy, np.repeat(sz, 2))
@@ -55,13 +58,13 @@ class Past:
     def coast(self, w: Weights, viscosity: float, out: np.ndarray) -> None:
         """Into ``out`` the velocity's modes, as pairs of reals, at the end of a step without forces."""
         past = (self.now, self.old, self.n_now, self.n_old)
-        _coast(out, *past, *self._s, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old, self.band.most)
+        _coast(out, *past, *self._s, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old)
 
     def push(self, w: Weights, viscosity: float, modes: np.ndarray, scale: float) -> None:
-        """Takes a step with the force density's modes times 1/scale, as pairs of reals; leaves u's band there."""
+        """Takes a step with the force density's modes times 1/scale, as pairs of reals; leaves u there, filtered."""
         past = (self.now, self.old, self.n_now, self.n_old)
-        wave = (*self._k, *self._s)
-        _push(modes, *past, *wave, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old, scale, self.band.most)
+        wave = (*self._k, *self._s, *self._f)
+        _push(modes, *past, *wave, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old, scale)
         self.now, self.old = self.old, self.now
         self.n_now, self.n_old = self.n_old, self.n_now  # the newest advection is yet to be written into n_now
         self.dt_old = w.dt
@@ -80,55 +83,39 @@ class Past:
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _coast(out, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old, most):
+def _coast(out, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old):
     nx, ny, nz = now.shape[1:]
-    few = 2 * (most[2] + 1)
     for x in range(3):
         for i in range(nx):
-            p = place(i, nx, most[0])
             for j in range(ny):
                 s = alpha + viscosity * (sx[i] + sy[j])
-                q = place(j, ny, most[1])
-                first = few if p >= 0 and q >= 0 else 0
-                for k in range(first):
-                    f = (
-                        b * now[x, i, j, k]
-                        + b_old * old[x, i, j, k]
-                        + c * n_now[x, p, q, k]
-                        + c_old * n_old[x, p, q, k]
-                    )
+                for k in range(nz):
+                    f = b * now[x, i, j, k] + b_old * old[x, i, j, k]
+                    f += c * n_now[x, i, j, k] + c_old * n_old[x, i, j, k]
                     out[x, i, j, k] = f / (s + viscosity * sz[k])
-                for k in range(first, nz):
-                    out[x, i, j, k] = (b * now[x, i, j, k] + b_old * old[x, i, j, k]) / (s + viscosity * sz[k])
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _push(modes, now, old, n_now, n_old, kx, ky, kz, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old, scale, most):
-    """``old`` becomes the new velocity; ``modes``, the forces', become its band, with zeros elsewhere."""
+def _push(
+    modes, now, old, n_now, n_old, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, viscosity, b, b_old, c, c_old, scale
+):
+    """``old`` becomes the new velocity; ``modes``, the forces', become the same, filtered."""
     nx, ny, nz = now.shape[1:]
-    few = 2 * (most[2] + 1)
     for i in range(nx):
-        p = place(i, nx, most[0])
         for j in range(ny):
-            q = place(j, ny, most[1])
-            first = few if p >= 0 and q >= 0 else 0
-            s, d = alpha + viscosity * (sx[i] + sy[j]), kx[i] * kx[i] + ky[j] * ky[j]
+            s, d, e = alpha + viscosity * (sx[i] + sy[j]), kx[i] * kx[i] + ky[j] * ky[j], fx[i] * fy[j]
             for k in range(nz):
                 u, v, w = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
                 square = d + kz[k] * kz[k]
-                f = (kx[i] * u + ky[j] * v + kz[k] * w) / square if square != 0.0 else 0.0
-                g = 1.0 / (s + viscosity * sz[k])
-                u, v, w = scale * (u - kx[i] * f), scale * (v - ky[j] * f), scale * (w - kz[k] * f)
-                old[0, i, j, k] = g * (b * now[0, i, j, k] + b_old * old[0, i, j, k] + u)
-                old[1, i, j, k] = g * (b * now[1, i, j, k] + b_old * old[1, i, j, k] + v)
-                old[2, i, j, k] = g * (b * now[2, i, j, k] + b_old * old[2, i, j, k] + w)
-            for x in range(3):
-                for k in range(first):
-                    g = 1.0 / (s + viscosity * sz[k])
-                    u = old[x, i, j, k] + g * (c * n_now[x, p, q, k] + c_old * n_old[x, p, q, k])
-                    old[x, i, j, k] = modes[x, i, j, k] = u
-                for k in range(first, nz):
-                    modes[x, i, j, k] = 0.0
+                p = (kx[i] * u + ky[j] * v + kz[k] * w) / square if square != 0.0 else 0.0
+                g, f = 1.0 / (s + viscosity * sz[k]), e * fz[k]
+                u, v, w = scale * (u - kx[i] * p), scale * (v - ky[j] * p), scale * (w - kz[k] * p)
+                u += b * now[0, i, j, k] + b_old * old[0, i, j, k] + c * n_now[0, i, j, k] + c_old * n_old[0, i, j, k]
+                v += b * now[1, i, j, k] + b_old * old[1, i, j, k] + c * n_now[1, i, j, k] + c_old * n_old[1, i, j, k]
+                w += b * now[2, i, j, k] + b_old * old[2, i, j, k] + c * n_now[2, i, j, k] + c_old * n_old[2, i, j, k]
+                old[0, i, j, k], modes[0, i, j, k] = g * u, f * g * u
+                old[1, i, j, k], modes[1, i, j, k] = g * v, f * g * v
+                old[2, i, j, k], modes[2, i, j, k] = g * w, f * g * w
     for x in range(3):
         for k in range(2):
             old[x, 0, 0, k] = modes[x, 0, 0, k] = 0.0

@@ -30,6 +30,8 @@ def real(case, wisdom: str):
     return Simulation(case, wisdom)
 
 
+SHORT = ("time.end=0.1", "time.step='auto'", "fluid.cells=[32,32,32]", "output.every=0.02")
+
 # What going on bit for bit is tested with: (case, how its simulation is made, steps at which it is cut).
 SCENES = {
     "fake": (lambda: case(), FakeSimulation, (1, 17, 18, 200, 339)),
@@ -39,6 +41,16 @@ SCENES = {
         shipped("swimmer/swimmer_stokes.toml", "time.end=0.1", "fluid.cells=[32,32,32]", "output.grid_every=0.05"),
         real,
         (2, 7),
+    ),
+    "swimmer with inertia": (
+        shipped("inertia/swimmer_re_10.toml", *SHORT, "output.grid_every=0.05", "output.fields=['pressure']"),
+        real,
+        (2, 7),
+    ),
+    "with inertia, by tolerance": (
+        shipped("inertia/swimmer_re_10.toml", *SHORT, "time.tolerance=0.02", "fluid.method=krylov"),
+        real,
+        (3, 9),
     ),
     "whirling": (shipped("ends/whirling.toml", "time.end=0.1"), real, (2, 11)),
 }
