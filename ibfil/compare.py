@@ -20,7 +20,7 @@ from .errors import CaseError, RunFailed
 from .members import Member, Outcome, run_members
 from .quantities import Quantity, Window, quantities
 from .record import RunFile
-from .study import measured, source, write_csv, write_json
+from .study import measured, numbers, source, write_csv, write_json
 
 if TYPE_CHECKING:
     from .case import Case
@@ -140,12 +140,19 @@ def _column(
         return Column(name, outcome, "", {}, (), ())
     run = runs[name]
     found = quantities(run, window, None if name == first else runs[first])
+    found |= {f"observed: {key}": Quantity(value, None, "") for key, value in _observed(run).items()}
     seconds, _, covered = run.pace
     unit = "s" if run.case.units.time == "1" else f"s/{run.case.units.time}"
     if covered > 0:
         found["wall time a unit of time"] = Quantity(seconds / covered, None, unit)
     found["steps"] = Quantity(float(run.steps), None, "1")
     return Column(name, outcome, run.method, found, own[name], tuple(share_lines(Simulation(run.case))))
+
+
+def _observed(run: RunFile) -> dict[str, float]:
+    """The case's own observables but for the dissipation, which has its rows."""
+    heat = {name for name, one in run.case.observe.items() if one.kind == "dissipation"}
+    return {key: value for key, value in numbers(run).items() if key not in heat}
 
 
 def choose_window(case: Case, end: float, period: float | None, transient: float | None) -> Window:
