@@ -35,7 +35,12 @@ class Answer(NamedTuple):
 
 
 class Response(Protocol):
-    """A fluid at frozen positions, over a step whose effective length is tau (units of time)."""
+    """A fluid at frozen positions, over a step whose effective length is tau (units of time).
+
+    ``keeps``: ``implicit`` leaves its matrix as it is, and given the same object again it has what it made of it.
+    """
+
+    keeps: bool
 
     def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
         """The displacements y = target + tau (u0 + M (force + R)); no stiffness."""

@@ -127,6 +127,8 @@ class ImmersedResponse(ABC):
     c numbers of a node go through the grid.
     """
 
+    keeps = False
+
     def __init__(self, fluid: Immersed, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> None:
         self.fluid, self.tau, self.parts = fluid, tau, fluid.coupling.parts
         self.nodes = fluid.nodes(r, e3)

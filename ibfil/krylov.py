@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.linalg import LinearOperator, gmres
 
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
@@ -28,8 +28,8 @@ Product = Callable[[np.ndarray], np.ndarray]
 def dense_system(matrix: np.ndarray, stiffness: np.ndarray, tau: float, index: np.ndarray) -> np.ndarray:
     """1 - tau M K with the columns of held unknowns replaced by those of -tau M; K may have any band."""
     n = len(matrix)
-    system = np.empty((n, n))
-    for first in range(0, n, _BLOCK):
+    system = np.empty((n, n)) if n > 2 * _BLOCK else matrix @ stiffness
+    for first in range(0, n if n > 2 * _BLOCK else 0, _BLOCK):
         columns = slice(first, first + _BLOCK)
         rows = np.flatnonzero(stiffness[:, columns].any(axis=1))
         some = slice(rows[0], rows[-1] + 1) if rows.size else slice(0, 0)
@@ -40,6 +40,25 @@ def dense_system(matrix: np.ndarray, stiffness: np.ndarray, tau: float, index: n
     return system
 
 
+class Factors(NamedTuple):
+    """LU factors, with pivots, of the transpose of a system: rows of C are columns of LAPACK, so nothing is copied."""
+
+    lu: np.ndarray
+    pivots: np.ndarray
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """x with system x = right."""
+        return dgetrs(self.lu, self.pivots, right, trans=1)[0]
+
+
+def factor(system: np.ndarray) -> Factors:
+    """The factors of ``system`` (n, n), which is overwritten. Raises numpy.linalg.LinAlgError where it is singular."""
+    lu, pivots, fault = dgetrf(system.T, overwrite_a=True)
+    if fault:
+        raise np.linalg.LinAlgError("Singular matrix")
+    return Factors(lu, pivots)
+
+
 class Blocks(NamedTuple):
     """A preconditioner: LU factors of the system's diagonal block for each range of unknowns, and their scale.
 
@@ -47,14 +66,14 @@ class Blocks(NamedTuple):
     unknown the force that would move it by one.
     """
 
-    factors: list[tuple[slice, tuple[np.ndarray, np.ndarray]]]
+    factors: list[tuple[slice, Factors]]
     scale: np.ndarray
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """The approximate x (n,)."""
         out = np.empty_like(right)
         for at, factors in self.factors:
-            out[at] = lu_solve(factors, right[at], check_finite=False)
+            out[at] = factors.solve(right[at])
         return out
 
 
@@ -63,7 +82,7 @@ def factored(parts: list[tuple[slice, np.ndarray]], held: np.ndarray) -> Blocks:
     diagonal = np.concatenate([np.diag(system) for _, system in parts])
     scale = np.ones(len(diagonal))
     scale[held] = 1.0 / diagonal[held]
-    return Blocks([(at, lu_factor(system, overwrite_a=True, check_finite=False)) for at, system in parts], scale)
+    return Blocks([(at, factor(system)) for at, system in parts], scale)
 
 
 class Solution(NamedTuple):

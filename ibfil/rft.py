@@ -89,6 +89,8 @@ def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, prof
 
 
 class _Response:
+    keeps = False
+
     def __init__(self, drag: Drag, profile: banded.Profile, e3: np.ndarray, flow, tau: float) -> None:
         self.drag, self.profile, self.e3, self.flow, self.tau = drag, profile, e3, flow, tau
 

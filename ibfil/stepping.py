@@ -163,18 +163,20 @@ def _stride(move: np.ndarray, shape: Geometry) -> float:
 class Implicit:
     """Backward Euler (order 1) or variable-step BDF2 (order 2): Newton on the force, M frozen where the rods will be.
 
-    M is taken at the extrapolated positions; the first iteration leaves compressive geometric stiffness out of the
-    matrix, and so does any that makes the correction grow. Two or three iterations are usual.
+    M is taken at the extrapolated positions. It begins there, and goes on while each correction is less than half of
+    the one before; a matrix serves again where the fluid keeps its factors and corrections shrink by ``again``.
 
-    It begins at the start of the step, from where whole corrections fail least. Where they do, as on soft rods of
-    many nodes, whose ends move by more than a segment in a step, it goes a second time: from the extrapolated
-    positions, with corrections cut to what changes no segment by more than ``stride`` of itself.
+    Where that fails it begins at the start of the step: the first iteration leaves compressive geometric stiffness out
+    of the matrix, and so does any that makes the correction grow. Where that fails too, as on soft rods of many nodes,
+    whose ends move by more than a segment in a step, it goes a third time: from the extrapolated positions, with
+    corrections cut to what changes no segment by more than ``stride`` of itself.
     """
 
     order: int = 2
     tolerance: float = 1e-8  # largest correction of a node: of the length, and in radians of its turn
     most: int = 12  # iterations, each time
     stride: float = 0.1  # of a segment
+    again: float = 0.15  # of the correction before
 
     def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
         """Newton to ``tolerance``. Raises one of FAILURES, NotConverged after ``most`` iterations among them."""
@@ -190,11 +192,41 @@ class Implicit:
             target,
             rods.held(state.time, after),
         )
-        try:
-            y, answer, count = self._newton(equation, np.zeros(target.shape), state.shape, None)
-        except FAILURES:
-            y, answer, count = self._newton(equation, ahead, there, self.stride)
+        y, answer, count = self._solve(equation, ahead, there)
         return _finish(rods, state, dt, y, (y - target) / tau, answer, count, equation.response)
+
+    def _solve(self, equation: _Equation, ahead: np.ndarray, there: Geometry) -> tuple[np.ndarray, Answer, int]:
+        """Newton from wherever it converges; ``ahead`` are the extrapolated displacements, to ``there``."""
+        if ahead.any():
+            try:
+                return self._quickly(equation, ahead, there)
+            except FAILURES:
+                pass
+        try:
+            return self._newton(equation, np.zeros(ahead.shape), equation.start, None)
+        except FAILURES:
+            return self._newton(equation, ahead, there, self.stride)
+
+    def _quickly(self, equation: _Equation, y: np.ndarray, shape: Geometry) -> tuple[np.ndarray, Answer, int]:
+        """From y, where the rods have ``shape``, to the solution, while corrections halve at least."""
+        rods, last, rate, exact = equation.rods, _size(y, equation.rods.length), np.inf, 0
+        for count in range(1, self.most + 1):
+            force, inner = rods.forces(shape, equation.time)
+            if rate > self.again or not equation.response.keeps:
+                matrix = rods.stiffness(shape, equation.start, inner, equation.time, False)
+                exact += 1
+            answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
+            size = _size(answer.move, rods.length)
+            rate = size / max(last, self.tolerance)
+            if not rate < 0.5:
+                break
+            y = y + answer.move
+            # An exact matrix squares the error, a matrix of before takes the same part of it each time.
+            coming = size * rate**2 if exact == count > 1 else size * rate if count > 1 else size
+            if coming < self.tolerance:
+                return y, answer, count
+            shape, last = rods.move(equation.start, y), size
+        raise NotConverged(f"corrections do not shrink after {count} iterations", 0)
 
     def _newton(
         self, equation: _Equation, y: np.ndarray, shape: Geometry, stride: float | None

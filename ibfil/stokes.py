@@ -75,13 +75,16 @@ class StokesSolve:
 
 
 class _Dense(ImmersedResponse):
-    """A dense mobility matrix (c n, c n), exact or averaged."""
+    """A dense mobility matrix (c n, c n), exact or averaged; keeps the factors of the last system."""
+
+    keeps = True
 
     def __init__(
         self, fluid: Immersed, matrix: np.ndarray, r: np.ndarray, e3: np.ndarray, time: float, tau: float
     ) -> None:
         super().__init__(fluid, r, e3, time, tau)
         self.matrix = matrix
+        self._factors: tuple[np.ndarray, krylov.Factors] | None = None  # and the stiffness they are of
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         return self.matrix @ force
@@ -90,8 +93,12 @@ class _Dense(ImmersedResponse):
         return self.matrix[:, index]
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
-        stiffness = statement.frozen().matrix(slice(0, len(self.nodes.axes)))
-        return np.linalg.solve(krylov.dense_system(self.matrix, stiffness, self.tau, statement.index), right)
+        rods = statement.frozen()
+        if self._factors is None or self._factors[0] is not rods.band:
+            stiffness = rods.matrix(slice(0, len(self.nodes.axes)))
+            system = krylov.dense_system(self.matrix, stiffness, self.tau, statement.index)
+            self._factors = rods.band, krylov.factor(system)
+        return self._factors[1].solve(right)
 
 
 class Tabulated(Memoryless, ABC):
@@ -154,7 +161,8 @@ class _Fourier(ImmersedResponse):
 
     def __init__(self, owner: StokesByFFT, r: np.ndarray, e3: np.ndarray, time: float, tau: float) -> None:
         super().__init__(owner.fluid, r, e3, time, tau)
-        self.owner, self.solves = owner, 0
+        self.owner, self.solves, self.keeps = owner, 0, owner.keeps
+        self.blocks: tuple[np.ndarray, krylov.Blocks] | None = None  # and the stiffness they are of
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         f, nodes, coupling = force.reshape(-1, self.parts), self.nodes, self.fluid.coupling
@@ -180,6 +188,8 @@ class _Fourier(ImmersedResponse):
 class StokesByFFT(Tabulated):
     """IB Stokes by FFT; GMRES is preconditioned by the exact matrix of all nodes and so needs an iteration or two."""
 
+    keeps = True
+
     def __init__(self, fluid: Immersed, solver: Solver, alpha: float = 0.0) -> None:
         super().__init__(fluid, alpha)
         self.solver = solver
@@ -195,9 +205,10 @@ class StokesByFFT(Tabulated):
 
     def solve(self, response: _Fourier, statement: Reduced, product: krylov.Product, right: np.ndarray) -> np.ndarray:
         """x with product(x) = right, preconditioned by the exact matrix of all nodes."""
-        nodes = response.nodes
-        blocks = self._factored(nodes, response.tau, statement.frozen(), (slice(0, len(nodes.axes)),))
-        return _checked(krylov.solve(product, right, blocks, _EXACT, _MOST))
+        nodes, rods = response.nodes, statement.frozen()
+        if response.blocks is None or response.blocks[0] is not rods.band:
+            response.blocks = rods.band, self._factored(nodes, response.tau, rods, (slice(0, len(nodes.axes)),))
+        return _checked(krylov.solve(product, right, response.blocks[1], _EXACT, _MOST))
 
     def _factored(self, nodes: Nodes, tau: float, rods: RodStiffness, ranges: tuple[slice, ...]) -> krylov.Blocks:
         parts, c = [], self.fluid.coupling.parts
@@ -229,6 +240,8 @@ class StokesByKrylov(StokesByFFT):
     ``worth`` is what making them costs, in products. What they were made from is part of a run's state, so that a
     resumed run has the same ones.
     """
+
+    keeps = False
 
     def __init__(self, fluid: Immersed, solver: Solver, worth: float, alpha: float = 0.0) -> None:
         super().__init__(fluid, solver, alpha)
