@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from . import stokes
-from .advection import PRODUCTS
-from .navier_stokes import Background, NavierStokes, Room
+from .navier_stokes import FIELDS, Background, NavierStokes, Room
 from .stirring import StirredSolve
 from .transforms import VectorTransform
 
@@ -21,7 +20,7 @@ def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> Navi
     ``worth``: what a preconditioner of krylov costs, in velocity evaluations.
     """
     (nx, ny, nz), threads = (int(n) for n in made.grid.cells), case.compute.threads
-    flow = VectorTransform((nx, ny, nz), threads, fields=PRODUCTS)
+    flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS)
     spin = VectorTransform((nx, ny, nz), threads) if made.coupling.vectors == 2 else None
 
     def operator(alpha: float) -> stokes.Tabulated:

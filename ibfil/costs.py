@@ -65,7 +65,7 @@ def of_rods(case: Case, nodes: int, scheme: str = "") -> float:
 
 def of_inertia(cells: Sequence[int], stirs: bool) -> float:
     """Seconds a step for a fluid's past and advection: components through FFTs, whatever answers to the forces."""
-    return 1.2 * (8 + 6 * (2 if stirs else 1)) / 6 * full_evaluation(cells)
+    return 1.2 * (9 + 6 * (2 if stirs else 1)) / 6 * full_evaluation(cells)
 
 
 def seconds_a_step(
@@ -106,7 +106,7 @@ def seconds_a_step(
 
 
 def _with_inertia(case: Case, stirs: bool, rods: Sequence[int], cells: Sequence[int]) -> dict[str, float]:
-    """The same with a past and advection: 14 components through FFTs a step, whatever answers to the forces."""
+    """The same with a past and advection: 15 components through FFTs a step, whatever answers to the forces."""
     rounds, nodes, parts = _ROUNDS[case.time.scheme], sum(rods), 4 if stirs else 3
     vectors, build = parts - 2, 0.5 * nodes**2 * _PAIR * (_COMPONENTS if stirs else 1)
     full = vectors * (full_evaluation(cells) + nodes * _SPREAD)

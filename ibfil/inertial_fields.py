@@ -37,7 +37,7 @@ class InertialFields(GridFields):
         smooth = fx[:, None, None] * fy[:, None] * fz
         t.modes[:] = self._fluid.past.now.view(complex) * smooth
         own = t.backward().copy()
-        flow = np.zeros_like(own) if self.flow is None else self._fluid.background()
+        flow = np.zeros_like(own) if self.flow is None else self._fluid.background()[:3]
         square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
         square[square == 0] = np.inf
         total = np.zeros(square.shape, complex)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .advection import PRODUCTS, divergence, filters, products, products_in
+from .advection import cross, cross_in, curl, filters
 from .fluid import Response
 from .grid import Grid, interpolate, spread
 from .immersed import Flow, Immersed, ImmersedResponse, Nodes
@@ -26,6 +26,7 @@ from .stokes import Tabulated
 from .transforms import VectorTransform
 
 SAME = 1e-9  # steps that differ by less, as the differences of rounded times do, share their operator
+FIELDS = 6  # that are transformed together: velocity and vorticity
 KEPT = 2  # operators: Euler's first step has another alpha than BDF2's
 COURANT = 1.0  # cells that the fastest fluid may cross in a step
 
@@ -38,22 +39,23 @@ class Background:
         self._known: tuple[float, np.ndarray] | None = None
 
     def at(self, time: float) -> np.ndarray:
-        """The velocity (3, nx, ny, nz) at ``time``."""
+        """Velocity and vorticity (6, nx, ny, nz) at ``time``."""
         if self._known is None or not (self._steady or self._known[0] == time):
             nx, ny, nz = (int(n) for n in self._grid.cells)
-            transform = VectorTransform((nx, ny, nz), self._threads, "FFTW_ESTIMATE")
-            transform.real[:] = self._flow(self._grid.points(), time).T.reshape(3, nx, ny, nz)
+            transform = VectorTransform((nx, ny, nz), self._threads, "FFTW_ESTIMATE", FIELDS)
+            transform.real[:3] = self._flow(self._grid.points(), time).T.reshape(3, nx, ny, nz)
             fx, fy, fz = filters(self._grid)
             modes = transform.forward()
-            modes *= fx[:, None, None] * fy[:, None] * fz
-            self._known = time, transform.backward() / transform.size
+            modes[:3] *= fx[:, None, None] * fy[:, None] * fz
+            curl(modes, *self._grid.wave_numbers()[0])
+            self._known = time, transform.backward(FIELDS) / transform.size
         return self._known[1]
 
 
 class Room:
     """Where fields are transformed; what it holds does not outlive a call, so others may use it too.
 
-    ``flow`` takes PRODUCTS components forth. ``spin`` is there where nodes stir the fluid (stirring.py).
+    ``flow`` has FIELDS components. ``spin`` is there where nodes stir the fluid (stirring.py).
     """
 
     def __init__(self, flow: VectorTransform, spin: VectorTransform | None, grid: Grid) -> None:
@@ -110,6 +112,7 @@ class NavierStokes:
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: _Asked | None = None
         self.fastest, self.time = 0.0, 0.0
+        self._waves, _ = fluid.grid.wave_numbers()
 
     def _operator(self, alpha: float) -> tuple[float, Tabulated]:
         """The operator of alpha, or of one that is the same but for round-off."""
@@ -144,16 +147,17 @@ class NavierStokes:
     def _advect(self) -> None:
         """The advection of the velocity that the transform holds, filtered."""
         t = self.room.flow
-        t.backward()
+        curl(t.modes, *self._waves)
+        t.backward(FIELDS)
         if self._background is None:
-            self.fastest = products(t.real, 0.0)
+            self.fastest = cross(t.real, 0.0)
         else:
-            self.fastest = products_in(t.real, self.background(), 0.0)
-        waves, _ = self.fluid.grid.wave_numbers()
-        divergence(t.forward(PRODUCTS), *waves, *filters(self.fluid.grid), self.density / t.size, self.past.n_now)
+            self.fastest = cross_in(t.real, self.background(), 0.0)
+        t.forward()
+        self.past.advect(self.room.reals, self.density / t.size)
 
     def background(self) -> np.ndarray:
-        """The maintained flow (3, nx, ny, nz) now, which there must be; filtered."""
+        """Velocity and vorticity (6, nx, ny, nz) of the maintained flow now, which there must be; filtered."""
         assert self._background is not None
         return self._background.at(self.time)
 

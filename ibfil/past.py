@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from .advection import filters
+from .advection import filters, projected
 from .grid import Grid
 
 
@@ -68,6 +68,10 @@ class Past:
         self.now, self.old = self.old, self.now
         self.n_now, self.n_old = self.n_old, self.n_now  # the newest advection is yet to be written into n_now
         self.dt_old = w.dt
+
+    def advect(self, modes: np.ndarray, scale: float) -> None:
+        """Takes up the advection of the newest velocity: scale times the modes, as pairs of reals."""
+        projected(modes, *self._k, *self._f, scale, self.n_now)
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """All of it; nothing before the first step."""

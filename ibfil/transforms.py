@@ -58,8 +58,8 @@ class VectorTransform:
     """Forward and backward transforms of ``real`` (3, nx, ny, nz) and ``modes`` (3, nx, ny, nz//2 + 1).
 
     ``forward`` keeps ``real``; ``backward`` overwrites both, and leaves the normalisation 1/(nx ny nz) to the caller.
-    ``planning`` is FFTW's: "FFTW_ESTIMATE" for a few transforms, "FFTW_MEASURE" for many. ``fields`` more than 3 are
-    transformed forward only.
+    ``planning`` is FFTW's: "FFTW_ESTIMATE" for a few transforms, "FFTW_MEASURE" for many. There may be more
+    ``fields`` than 3.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class VectorTransform:
             )
 
         self._forward = [plan(c, "FFTW_FORWARD") for c in range(fields)]
-        self._backward = [plan(c, "FFTW_BACKWARD") for c in range(3)]
+        self._backward = [plan(c, "FFTW_BACKWARD") for c in range(fields)]
         self.real[:] = 0.0
         self.modes[:] = 0.0
 
@@ -92,8 +92,8 @@ class VectorTransform:
             plan.execute()
         return self.modes
 
-    def backward(self) -> np.ndarray:
-        """``real`` of the first three of ``modes``, times the number of cells."""
-        for plan in self._backward:
+    def backward(self, fields: int = 3) -> np.ndarray:
+        """``real`` of the first ``fields`` of ``modes``, times the number of cells."""
+        for plan in self._backward[:fields]:
             plan.execute()
         return self.real

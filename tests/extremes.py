@@ -35,6 +35,7 @@ from ibfil.errors import RunFailed
 from ibfil.simulation import Simulation
 
 OMEGA = 10.0
+UMAX = 0.8  # of the swimmer's fastest node, omega = 10, L = 1
 PERIOD, LOOKS, FINER = 6.3, 3, 4  # radians, a multiple of 3 steps of 0.3, 0.1 and 0.03
 STRETCH, PLACE = 0.02, 0.05
 SOFT = 0.3  # of P/EA, see above
@@ -51,9 +52,10 @@ class Cell:
     eta: float = 1.0  # eta omega L^4/A1 / 10
     stretching: float = 1.6e4  # EA L^2/A1
     nodes: int = 41
-    apart: float = 1.0  # ds/h, in stokes
+    apart: float = 1.0  # ds/h, on a grid
     flat: float = 1.0  # A1/A2; C = A2
     radius: float = 0.01  # a/L of the drag against spin
+    re: float = 0.0  # rho umax L/eta, in navier-stokes; umax = 0.8 is the fastest node's
 
 
 @dataclass
@@ -101,7 +103,8 @@ def _fluid(cell: Cell) -> dict[str, Any]:
         return dict(RFT)
     h = 1.0 / (cell.nodes - 1) / cell.apart
     cells = 2 * int(np.ceil(0.7 / h))
-    return {"model": "stokes", "box": [cells * h] * 3, "cells": [cells] * 3, "slip": 0.01, "method": "table"}
+    grid = {"model": cell.fluid, "box": [cells * h] * 3, "cells": [cells] * 3, "slip": 0.01, "method": "table"}
+    return grid | ({"density": cell.re * cell.eta / UMAX} if cell.re else {})
 
 
 def case(cell: Cell, finer: int = 1) -> Case:
@@ -181,6 +184,13 @@ TABLES: list[Table] = [
         partial(Cell, fluid="stokes"),
     ),
     (
+        "inertia swimmer",
+        _named(re=(1e-4, 1e-2, 1.0, 10.0, 100.0), eta=(1e-2, 1.0, 100.0)),
+        [{"nodes": n, "apart": apart, "stretching": ea} for n, apart in GRIDS[1:3] for ea in (50.0, 1.6e4, 1e6)],
+        (0.25,),
+        partial(Cell, fluid="navier-stokes"),
+    ),
+    (
         "stokes ribbon",
         _named(flat=(1.0, 100.0), eta=(1e-3, 1.0, 1e3)),
         _named(radius=(1e-3, 0.1), stretching=(50.0, 1.6e4)),
@@ -222,6 +232,7 @@ def line(cell: Cell, verdict: Verdict) -> str:
         cell.apart,
         cell.flat,
         cell.radius,
+        cell.re,
     )
     a, b = verdict.path, verdict.finer
     numbers = f"{verdict.place:.1e},{verdict.stretch:.1e},{b.pull:.2g},{a.halved},{b.halved},{a.iterations}"
@@ -232,7 +243,7 @@ def main() -> None:
     """The map, then every cell, then how many of each mark."""
     found = list(tables(*sys.argv[1:2]))
     print(
-        "\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,position,stretch,pull,halved,finer halved,iterations,words"
+        "\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re,position,stretch,pull,halved,finer halved,iterations,words"
     )
     for cell, verdict in found:
         print(line(cell, verdict))

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scenes import STOKES, rms, run, slopes, swimmer
 
-from ibfil.advection import PRODUCTS, filters
+from ibfil.advection import filters
 from ibfil.errors import RunFailed
 from ibfil.fluid import Held
 from ibfil.grid import Grid
 from ibfil.immersed import Immersed
 from ibfil.kernels import KERNELS
-from ibfil.navier_stokes import Background, NavierStokes, Room
+from ibfil.navier_stokes import FIELDS, Background, NavierStokes, Room
 from ibfil.simulation import Simulation
 from ibfil.stokes import StokesByTable
 from ibfil.transforms import VectorTransform
@@ -29,7 +29,7 @@ def fluid(cells=(16, 16, 16), density=1.0, viscosity=0.1, flow=None, steady=True
     grid = Grid([2 * np.pi * n / cells[0] for n in cells], cells)
     made = Immersed(grid, KERNELS["peskin4"], viscosity, np.zeros(1), None, flow)
     background = None if flow is None else Background(grid, flow, steady)
-    room = Room(VectorTransform(tuple(cells), fields=PRODUCTS), None, grid)
+    room = Room(VectorTransform(tuple(cells), fields=FIELDS), None, grid)
     return NavierStokes(made, density, lambda alpha: StokesByTable(made, alpha), room, background)
 
 
