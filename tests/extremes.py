@@ -242,9 +242,7 @@ def line(cell: Cell, verdict: Verdict) -> str:
 def main() -> None:
     """The map, then every cell, then how many of each mark."""
     found = list(tables(*sys.argv[1:2]))
-    print(
-        "\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re,position,stretch,pull,halved,finer halved,iterations,words"
-    )
+    print("\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re,position,stretch,pull,halved,finer,iterations,words")
     for cell, verdict in found:
         print(line(cell, verdict))
     print("\n" + ", ".join(f"{mark} {count}" for mark, count in Counter(v.mark for _, v in found).most_common()))
