@@ -18,7 +18,16 @@ from .case_overrides import apply, load, split
 from .case_schema import Case, Coefficients, Matched, Scene
 from .case_values import keys
 from .errors import CaseError
-from .expressions import CONSTANTS, FUNCTIONS, VARIABLES, BrokenParameter, ExpressionError, Parameters, parse
+from .expressions import (
+    CONSTANTS,
+    FUNCTIONS,
+    VARIABLES,
+    BrokenParameter,
+    Expression,
+    ExpressionError,
+    Parameters,
+    parse,
+)
 
 __all__ = [
     "Case",
@@ -27,6 +36,7 @@ __all__ = [
     "parse_case",
     "quick_case",
     "read_case",
+    "written",
 ]
 
 MAX_BYTES = 1_000_000
@@ -69,9 +79,21 @@ def quick_case(case: Case, name: str) -> Case:
     return parse_case(tomli_w.dumps(raw), case.file)
 
 
-def differences(a: Case, b: Case) -> list[str]:
-    """The keys, as dotted paths, whose values differ; ``text`` and ``file`` are not compared."""
-    return [key for key in dict.fromkeys(_differing(a, b, ())) if key not in ("text", "file")]
+def differences(a: Case, b: Case) -> dict[str, tuple[Any, Any]]:
+    """The keys, as dotted paths, whose values differ, with both; ``text`` and ``file`` are not compared."""
+    return {key: (one, other) for key, one, other in _differing(a, b, ()) if key not in ("text", "file")}
+
+
+def written(value: Any) -> str:
+    """A value of a case as its file has it, or nearly."""
+    if isinstance(value, Expression):
+        return value.text if value.constant is None else f"{value.constant:g}"
+    if isinstance(value, BaseModel):
+        inner = ", ".join(f"{key} = {written(getattr(value, key))}" for key in sorted(value.model_fields_set))
+        return f"{{ {inner} }}" if inner else "the default"
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(written, value)) + "]"
+    return "nothing" if value is None else shown(value)
 
 
 def idle_keys(case: Case) -> list[str]:
@@ -267,8 +289,8 @@ def _quick_faults(raw: dict[str, Any], known: Sequence[Fault]) -> Iterator[Fault
 # --- comparing ------------------------------------------------------------------------------------
 
 
-def _differing(a: Any, b: Any, path: tuple[str | int, ...]) -> Iterator[str]:
-    """The paths at which two descriptions differ."""
+def _differing(a: Any, b: Any, path: tuple[str | int, ...]) -> Iterator[tuple[str, Any, Any]]:
+    """The paths at which two descriptions differ, and what stands there in each."""
     if isinstance(a, BaseModel) and type(a) is type(b):
         names = {name: key for key, name in keys(type(a)).items()}
         for name, key in names.items():
@@ -280,7 +302,7 @@ def _differing(a: Any, b: Any, path: tuple[str | int, ...]) -> Iterator[str]:
         for i, (one, other) in enumerate(zip(a, b, strict=True)):
             yield from _differing(one, other, (*path, i))
     elif a != b:
-        yield dotted(path)
+        yield dotted(path), a, b
 
 
 def _texts(value: Any) -> Iterator[str]:

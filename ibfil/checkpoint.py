@@ -15,7 +15,7 @@ import numpy as np
 from .record import RunFileError
 
 FORMAT = "ibfil-checkpoint"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 State = Mapping[str, "np.ndarray | float | int | str"]
 
@@ -74,7 +74,9 @@ def read(path: Path) -> Checkpoint:
             if file.attrs["format"] != FORMAT:
                 raise ValueError(FORMAT)
             if file.attrs["format_version"] != FORMAT_VERSION:
-                raise RunFileError(f"{path}: is a checkpoint of another version of ibfil")
+                found = f"is a checkpoint of format {int(file.attrs['format_version'])}"
+                cure = "go on with the ibfil that `ibfil show` says the run was written by"
+                raise RunFileError(f"{path}: {found}; this ibfil goes on from format {FORMAT_VERSION}: {cure}")
             state: dict[str, Any] = {}
             file["state"].visititems(lambda key, item: _get(state, key, item))
             scalars = {name: file.attrs[name] for name in _SCALARS}

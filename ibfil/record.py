@@ -327,10 +327,16 @@ def _check_format(file: h5py.File, path: Path) -> None:
         raise RunFileError(f"{path}: is an HDF5 file, but not a run file of ibfil")
     version = int(file.attrs["format_version"])
     if version != FORMAT_VERSION:
-        raise RunFileError(
-            f"{path}: has run-file format {version}, written by ibfil {file.attrs['ibfil_version']}; "
-            f"this ibfil reads format {FORMAT_VERSION}"
-        )
+        raise RunFileError(f"{path}: {other_format(version, str(file.attrs['ibfil_version']))}")
+
+
+def other_format(version: int, written_by: str) -> str:
+    """What to do with a file of another format version."""
+    if version > FORMAT_VERSION:
+        cure = f"read it with ibfil {written_by} or later (pip install -U ibfil)"
+    else:
+        cure = f"read it with ibfil {written_by}, or run its case again (it is in the attribute `case`)"
+    return f"has format {version}, written by ibfil {written_by}; this ibfil reads format {FORMAT_VERSION}: {cure}"
 
 
 def _damaged(path: Path) -> str:

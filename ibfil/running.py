@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import checkpoint, journal
-from .case import differences, parse_case, read_case
+from .case import differences, parse_case, read_case, written
 from .errors import CaseError
 from .loop import Loop, Result
 from .observe import Observable, Observers, observers
@@ -93,7 +93,11 @@ def resume_run(
         log(f"{path} cannot be used ({_why(damage)}); rebuilt by computing it again from t = 0")
         return run(case, path, overwrite=True, progress=progress, log=log, observables=observables, build=build)
     simulation = build(case, last.wisdom)
-    simulation.restore(dict(last.state))
+    try:
+        simulation.restore(dict(last.state))
+    except KeyError as missing:
+        place, wrote = checkpoint_path(path), "another version of ibfil wrote it: go on with that one"
+        raise RunFileError(f"{place}: has no {missing} in its state; {wrote}") from None
     if other:
         log(f"warning: {other}; the rest may differ in the last digits from a run that was not cut")
     log(f"going on with {path} from t = {last.time:.6g}, after {last.outputs} outputs and {last.steps} steps")
@@ -136,8 +140,9 @@ def _last_checkpoint(path: Path) -> checkpoint.Checkpoint:
 def _goes_on(began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
     """Return the case to go on with. Raises CaseError where more than time.end and output differs."""
     faults = [
-        f"{case.file}: {key}: found a change; allowed: with --resume only time.end and output may differ"
-        for key in differences(began, case)
+        f"{case.file}: {key}: found {written(now)}; the run began with {written(then)}, and only time.end and output "
+        'may change: go on without that, or begin a new run (shape.kind = "run" starts from a frame of this one)'
+        for key, (then, now) in differences(began, case).items()
         if key != "time.end" and key.split(".")[0] != "output"
     ]
     if case.time.end < last.time:

@@ -12,15 +12,10 @@ import pytest
 from fake_simulation import FakeSimulation, case
 
 from ibfil import running
-from ibfil.case import read_case
+from ibfil.case import parse_case
 from ibfil.errors import Interrupted
 
 HERE = Path(__file__).parent
-
-
-def shipped(name: str, *overrides: str):
-    """Makes a shipped case, shortened."""
-    return lambda: read_case(HERE.parent / "cases" / name, overrides)
 
 
 def real(case, wisdom: str):
@@ -30,29 +25,78 @@ def real(case, wisdom: str):
     return Simulation(case, wisdom)
 
 
-SHORT = ("time.end=0.1", "time.step='auto'", "fluid.cells=[32,32,32]", "output.every=0.02")
+ROD = """
+[filament.rod]
+length = 1.0
+nodes = 9
+bending = 1.0
+twisting = 1.0
+radius = 0.05
+stretching = 100.0
+curvature = ["3*sin(6*s - 40*t)", "2*s"]
+shape = { kind = "relaxed" }
+start = { end = "clamped", spin = 20.0 }
+[fluid]
+model = "rft"
+viscosity = 1.0
+box = [2.0, 2.0, 2.0]
+cells = [16, 16, 16]
+density = 1.0
+[time]
+end = 0.012
+step = 1e-3
+[output]
+every = 4e-3
+grid_every = 8e-3
+"""
+SECOND = """
+[filament.other]
+length = 0.5
+nodes = 9
+bending = 1.0
+stretching = 100.0
+position = [0.2, 0.1, 0.05]
+[contact]
+action = "warn"
+distance = 0.08
+"""
 
+
+def rod(*overrides: str, more: str = ""):
+    """Makes a case with a rod that is spun and bends itself in space."""
+    return lambda: parse_case(ROD + more, "rod.toml", overrides)
+
+
+FLUIDS = {
+    "rft": ["fluid.drag=slender"],
+    **{method: ["fluid.model=stokes", f"fluid.method={method}"] for method in ("table", "averaged", "fft", "pruned")},
+    "krylov": ["fluid.model=stokes", "fluid.method=krylov"],
+    "single": ["fluid.model=stokes", "fluid.precision=single"],
+    "stirred": ["fluid.model=stokes", "fluid.rotation=grid"],
+    "navier-stokes": ["fluid.model=navier-stokes", "output.fields=['pressure']"],
+    "navier-stokes fft": ["fluid.model=navier-stokes", "fluid.method=fft"],
+    "navier-stokes krylov": ["fluid.model=navier-stokes", "fluid.method=krylov", "fluid.rotation=grid"],
+}
+SCHEMES = {
+    "explicit": ["time.scheme=explicit", "time.step=1e-5", "time.end=1.2e-4", "output.every=4e-5"],
+    "semi-implicit": ["time.scheme=semi-implicit"],
+    "first order": ["time.order=1"],
+    "tolerance": ["time.tolerance=1e-2"],
+}
 # What going on bit for bit is tested with: (case, how its simulation is made, steps at which it is cut).
 SCENES = {
     "fake": (lambda: case(), FakeSimulation, (1, 17, 18, 200, 339)),
     "fake with fields": (lambda: case(grid=True), FakeSimulation, (1, 33, 34, 35, 299)),
-    "swimmer": (shipped("swimmer/swimmer_rft.toml", "time.end=0.1"), real, (2, 11, 30)),
-    "swimmer in a grid": (
-        shipped("swimmer/swimmer_stokes.toml", "time.end=0.1", "fluid.cells=[32,32,32]", "output.grid_every=0.05"),
-        real,
-        (2, 7),
-    ),
-    "swimmer with inertia": (
-        shipped("inertia/swimmer_re_10.toml", *SHORT, "output.grid_every=0.05", "output.fields=['pressure']"),
-        real,
-        (2, 7),
-    ),
-    "with inertia, by tolerance": (
-        shipped("inertia/swimmer_re_10.toml", *SHORT, "time.tolerance=0.02", "fluid.method=krylov"),
-        real,
-        (3, 9),
-    ),
-    "whirling": (shipped("ends/whirling.toml", "time.end=0.1"), real, (2, 11)),
+    **{fluid: (rod(*keys), real, (2, 7)) for fluid, keys in FLUIDS.items()},
+    **{
+        f"{scheme}, {fluid}": (rod(*FLUIDS[fluid], *keys), real, (2, 7))
+        for scheme, keys in SCHEMES.items()
+        for fluid in ("rft", "table", "navier-stokes", "navier-stokes krylov")
+        if (scheme, fluid) != ("explicit", "navier-stokes krylov")
+    },
+    "thermal": (rod("thermal={energy=1e-3}", "time.step=1e-3"), real, (2, 7)),
+    "thermal in the plane": (rod("thermal={energy=1e-3, directions='xy', twist=false}"), real, (1, 5)),
+    "contact": (rod(*FLUIDS["table"], more=SECOND), real, (2, 7)),
 }
 
 

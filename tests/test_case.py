@@ -297,7 +297,7 @@ def test_examples_parse_and_come_back_from_their_own_text(text):
     again = parse_case(first.text, first.file)
     assert again == first
     assert again.text == first.text
-    assert differences(first, again) == []
+    assert differences(first, again) == {}
     assert pickle.loads(pickle.dumps(first)) == first
 
 
@@ -584,8 +584,8 @@ def test_differences_name_the_keys():
         "output.every",
         "time.end",
     ]
-    assert differences(a, case(SHORT, "filament.rod.bending=[2.0, '1+1']", "time.scheme=implicit")) == []
-    assert differences(a, parse_case(SHORT, "another name")) == []
+    assert differences(a, case(SHORT, "filament.rod.bending=[2.0, '1+1']", "time.scheme=implicit")) == {}
+    assert differences(a, parse_case(SHORT, "another name")) == {}
 
 
 @pytest.mark.parametrize(

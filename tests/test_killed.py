@@ -21,19 +21,6 @@ from ibfil.errors import Interrupted
 from ibfil.record import RunFile, checkpoint_path, journal_path
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "run.h5"
-
-
-@pytest.fixture(scope="module")
-def uncut(tmp_path_factory) -> Path:
-    """The fake case, run without a break."""
-    path = tmp_path_factory.mktemp("uncut") / "uncut.h5"
-    run(case(), path)
-    return path
-
-
 def killed_over_and_over(path: Path, kills: int, seed: int) -> int:
     """Run the fake case in processes that are killed after a random while, until one comes to its end; the kills."""
     what, done, rng = "start", 0, random.Random(seed)

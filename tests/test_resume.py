@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -17,20 +16,6 @@ from runs import HERE, SCENES, content, go_on, interrupted, run, signalling, wai
 from ibfil import checkpoint
 from ibfil.errors import CaseError, Interrupted
 from ibfil.record import RunFile, RunFileError, checkpoint_path
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "run.h5"
-
-
-@pytest.fixture(scope="module")
-def uncut(tmp_path_factory) -> Path:
-    """The fake case, run without a break."""
-    path = tmp_path_factory.mktemp("uncut") / "uncut.h5"
-    run(case(), path)
-    return path
-
 
 # --- Ctrl-C, and going on --------------------------------------------------------------------------------------------
 
@@ -141,6 +126,7 @@ def test_another_scene_is_refused_with_its_keys(path):
         go_on(path, None, ["fluid.viscosity=2", "time.step=0.004", "time.end=3", "filament.rod.length=2"])
     told = "\n".join(caught.value.faults)
     assert len(caught.value.faults) == 3
+    assert "fluid.viscosity: found 2.0; the run began with 1.0, and only time.end and output may change" in told
     assert all(key in told for key in ("fluid.viscosity", "time.step", "filament.rod.length"))
     with pytest.raises(CaseError, match=r"fluid\.viscosity"):
         go_on(path, case("", "fluid.viscosity=2"))

@@ -6,7 +6,6 @@ import errno
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,20 +16,6 @@ from ibfil import checkpoint, recorder, running
 from ibfil.errors import CaseError, RunFailed
 from ibfil.record import RunFile, checkpoint_path
 from ibfil.schedule import due_times
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "run.h5"
-
-
-@pytest.fixture(scope="module")
-def uncut(tmp_path_factory) -> Path:
-    """The fake case, run without a break."""
-    path = tmp_path_factory.mktemp("uncut") / "uncut.h5"
-    run(case(), path)
-    return path
-
 
 # --- outputs ---------------------------------------------------------------------------------------------------------
 
