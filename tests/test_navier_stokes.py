@@ -388,3 +388,14 @@ def test_hardly_any_inertia_is_stokes_flow():
     )
     assert rms(almost - stokes) < 3e-5
     assert rms(far - stokes) > 1e-3
+
+
+@pytest.mark.slow
+def test_hardly_any_inertia_is_stokes_flow_on_the_papers_grid():
+    period = 2 * np.pi / 10
+    grid = {"box": [3.2] * 3, "cells": [64] * 3}
+    ends = [
+        run(swimmer({**fluid, **grid}, stretching=400.0, end=period, step=period / 100))
+        for fluid in (STOKES, inertial(1e-4))
+    ]
+    assert rms(ends[1].shape.r - ends[0].shape.r) < 3e-5
