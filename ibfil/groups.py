@@ -27,6 +27,9 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
     rate = max(simulation.driving_rates(), default=0.0)
     if rate:
         out["sperm number"] = length * (simulation.drag(filament) * rate / bending) ** 0.25
+        if case.fluid.model == "navier-stokes":
+            assert case.fluid.density is not None
+            out["Re = rho omega L^2/eta"] = case.fluid.density * rate * length**2 / case.fluid.viscosity
     if simulation.cycles:
         out["omega dt"] = max(simulation.cycles) * simulation.step_length
     stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))

@@ -10,9 +10,11 @@ from scenes import STOKES, rms, run, slopes, swimmer
 
 from ibfil.advection import filters
 from ibfil.errors import RunFailed
+from ibfil.fields import GridFields
 from ibfil.fluid import Held
 from ibfil.grid import Grid
 from ibfil.immersed import Immersed
+from ibfil.inertial_fields import InertialFields
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import FIELDS, Background, NavierStokes, Room
 from ibfil.simulation import Simulation
@@ -280,6 +282,24 @@ def test_a_net_force_is_carried_by_the_back_pressure_and_the_fluid_gains_no_mome
     assert np.abs(velocity(it)).max() > 0.01
     assert not it.past.now[:, 0, 0, :2].any()
     assert np.abs(velocity(it).mean(axis=(1, 2, 3))).max() < 1e-16
+
+
+@pytest.mark.parametrize("flow", [None, lambda r, t: np.tile([0.7, -0.4, 0.0], (len(r), 1))])
+def test_the_pressure_is_that_of_the_flow_and_of_the_forces(flow):
+    it = fluid(density=1.7, flow=flow)
+    x, y, _ = places(it)
+    begin(it, vortices(x, y))
+    fields, names = InertialFields(it, flow), ["velocity", "vorticity", "pressure"]
+    base, weights = it.fluid.stencil(FAR)
+    found = fields.evaluate(base, weights, ZERO, 0.0, names)
+    background = np.zeros(3) if flow is None else np.array([0.7, -0.4, 0.0])
+    assert found["velocity"] == pytest.approx(np.moveaxis(vortices(x, y), 0, -1) + background, abs=1e-6)
+    assert found["vorticity"][..., 2] == pytest.approx(2 * np.sin(x) * np.sin(y), abs=1e-6)
+    assert found["pressure"] == pytest.approx(1.7 / 4 * (np.cos(2 * x) + np.cos(2 * y)), abs=1e-6)
+    force = np.array([[1.0, -0.3, 0.7]])
+    pushed = fields.evaluate(base, weights, force, 0.0, names)["pressure"] - found["pressure"]
+    steady = GridFields(it.fluid.grid, 0.1, None).evaluate(base, weights, force, 0.0, names)["pressure"]
+    assert pushed == pytest.approx(steady, abs=1e-5 * float(np.abs(steady).max()))
 
 
 # --- what it remembers -----------------------------------------------------------------------------------------------
