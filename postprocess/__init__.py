@@ -1,0 +1,1 @@
+"""Scripts that read run files and draw; no part of the package, and not in the wheel."""
