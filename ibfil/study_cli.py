@@ -44,6 +44,9 @@ def add_studies(add: Callable[..., argparse.ArgumentParser]) -> None:
     )
     compare.add_argument("--period", type=_error, metavar="T", help="of the motion (default: of what drives it)")
     compare.add_argument("--transient", type=_error, metavar="T", help="left out at the start (default: a third)")
+    stability = add("stability", _stability, "which settings are stable and right: a map, with the predicted limit")
+    _common(stability, "stability")
+    stability.add_argument("--vary", action="append", required=True, metavar="KEY=V1,V2,...", help=VARY)
 
 
 def _common(command: argparse.ArgumentParser, kind: str) -> None:
@@ -208,3 +211,15 @@ def _print_comparison(made: Any) -> None:
     for column in made.columns:
         for line in column.shares:
             print(f"  {column.fluid}: {line}")
+
+
+def _stability(arguments: argparse.Namespace) -> int:
+    case, changes, folder = _begin(arguments, "stability")
+    axes = _axes(arguments.vary)
+    from . import stability
+
+    made = stability.stability(case, axes, folder, changes, jobs=arguments.jobs, say=_say)
+    _print_table(stability.rows(made), ("message",))
+    print(f"{made.foretold} of {len(made.cells)} as predicted")
+    print(f"{folder / stability.TABLE}, {stability.TOLD}, {stability.FIGURE}")
+    return 0
