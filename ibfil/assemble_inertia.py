@@ -40,4 +40,4 @@ def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> Navi
     if made.flow is not None:
         steady = not any("t" in component.variables for component in case.fluid.flow or ())
         background = Background(made.grid, made.flow, steady, threads)
-    return NavierStokes(made, case.fluid.density, operator, Room(flow, spin, made.grid), background)
+    return NavierStokes(made, case.fluid.density, operator, Room(flow, spin, made.grid, threads), background)

@@ -149,6 +149,29 @@ def evaluations(cells: int, bars: tuple[float, float]) -> list[Row]:
     ]
 
 
+def inertia(cells: int = 64) -> Row:
+    """One step of the swimmer at rho = 10, advection and rods included, against the 15 components it would transform.
+
+    Forces and coasting velocities go through slabs (slab.py), so that fewer are transformed in full: nine.
+    """
+    text = case_text(41, "navier-stokes", "auto", "implicit", 1e-2)
+    changes = ["fluid.density=10", f"fluid.cells=[{cells}, {cells}, {cells}]"]
+    simulation = Simulation(parse_case(text, "bench", changes))
+    simulation.advance(0.05, lambda: None)
+    whole, dt = simulation.fluid.room.flow, 1e-2  # type: ignore[attr-defined]
+
+    def step() -> None:
+        simulation.accept(simulation.attempt(dt), simulation.time + dt)
+
+    def bare() -> None:
+        whole.forward()
+        whole.backward(6)
+        whole.forward()
+        whole.backward()
+
+    return against(f"Navier-Stokes step, 41 nodes, {cells}^3", step, f"6 r2c + 9 c2r at {cells}^3", bare, 1.2)
+
+
 def table_pair(kernel: str, bar: float, count: int = 41) -> Row:
     """One pair of the mobility table, against a microsecond."""
     grid = Grid([3.2] * 3, [64] * 3)
@@ -248,6 +271,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         rft_step(),
         *evaluations(64, (1.15, 1 / 3.5)),
         *evaluations(128, (1.3, 1 / 5)),
+        inertia(),
         table_pair("peskin4", 1.0),
         table_pair("bkp6", 4.5),
         start_up(),

@@ -18,9 +18,10 @@ import numpy as np
 
 from .advection import cross, cross_in, curl, filters
 from .fluid import Response
-from .grid import Grid, interpolate, spread
+from .grid import Grid, interpolate
 from .immersed import Flow, Immersed, ImmersedResponse, Nodes
 from .past import Past, Weights, weights
+from .slab import Slab
 from .stirring import half_curl
 from .stokes import Tabulated
 from .transforms import VectorTransform
@@ -58,17 +59,18 @@ class Room:
     ``flow`` has FIELDS components. ``spin`` is there where nodes stir the fluid (stirring.py).
     """
 
-    def __init__(self, flow: VectorTransform, spin: VectorTransform | None, grid: Grid) -> None:
+    def __init__(self, flow: VectorTransform, spin: VectorTransform | None, grid: Grid, threads: int = 1) -> None:
         self.flow, self._spin = flow, spin
+        self._slabs = [Slab(room, threads) for room in (flow, spin) if room is not None]
         self.modes = flow.modes[:3]
         self.reals = self.modes.view(float)
         self._k, _ = grid.wave_numbers()
 
     def put(self, nodes: Nodes, vectors: np.ndarray) -> None:
         """Leaves the modes of what nodes put onto the grid: forces (n, 3), or forces and torques (n, 6)."""
-        _spread(nodes, vectors[:, :3], self.flow)
+        for k, slab in enumerate(self._slabs):
+            slab.put(nodes, vectors[:, 3 * k : 3 * k + 3])
         if self._spin is not None:
-            _spread(nodes, vectors[:, 3:], self._spin)
             half_curl(self._spin.modes, *self._k, self.modes)
 
     def take(self, nodes: Nodes) -> np.ndarray:
@@ -76,14 +78,7 @@ class Room:
         if self._spin is not None:
             self._spin.modes[:] = 0.0
             half_curl(self.modes, *self._k, self._spin.modes)
-        rooms = (self.flow,) if self._spin is None else (self.flow, self._spin)
-        return np.hstack([interpolate(nodes.base, nodes.weights, room.backward()) for room in rooms])
-
-
-def _spread(nodes: Nodes, vectors: np.ndarray, room: VectorTransform) -> None:
-    room.real[:3] = 0.0
-    spread(nodes.base, nodes.weights, vectors, room.real)
-    room.forward()
+        return np.hstack([slab.take(nodes) for slab in self._slabs])
 
 
 class _Asked(NamedTuple):
@@ -127,8 +122,8 @@ class NavierStokes:
         alpha, operator = self._operator(self.density / tau)
         response = operator.response(r, e3, time, tau)
         past = weights(alpha, tau, w, self.past.dt_old)
+        self.past.coast(past, self.fluid.viscosity, self.room.reals)
         if self.past.dt_old > 0:
-            self.past.coast(past, self.fluid.viscosity, self.room.reals)
             u0 = self.fluid.coupling.drop(response.nodes.axes, self.room.take(response.nodes))
             response.flow = u0 if response.flow is None else response.flow + u0
         self._asked = _Asked(response, past)

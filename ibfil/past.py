@@ -49,6 +49,7 @@ class Past:
     def __init__(self, grid: Grid) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
         self.now, self.old, self.n_now, self.n_old = (np.zeros((3, nx, ny, 2 * (nz // 2 + 1))) for _ in range(4))
+        self._ahead = np.zeros_like(self.now)  # what the last step asked about would come to without forces
         fx, fy, fz = filters(grid)
         self._f = (fx, fy, np.repeat(fz, 2))
         self.dt_old = 0.0
@@ -57,14 +58,15 @@ class Past:
 
     def coast(self, w: Weights, viscosity: float, out: np.ndarray) -> None:
         """Into ``out`` the velocity's modes, as pairs of reals, at the end of a step without forces."""
-        past = (self.now, self.old, self.n_now, self.n_old)
+        past = (self._ahead, self.now, self.old, self.n_now, self.n_old)
         _coast(out, *past, *self._s, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old)
 
     def push(self, w: Weights, viscosity: float, modes: np.ndarray, scale: float) -> None:
-        """Takes a step with the force density's modes times 1/scale, as pairs of reals; leaves u there, filtered."""
-        past = (self.now, self.old, self.n_now, self.n_old)
-        wave = (*self._k, *self._s, *self._f)
-        _push(modes, *past, *wave, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old, scale)
+        """Takes the step last asked about: the force density's modes times 1/scale, as pairs of reals, act over it.
+
+        Leaves u there, filtered.
+        """
+        _push(modes, self._ahead, self.old, *self._k, *self._s, *self._f, w.alpha, viscosity, scale)
         self.now, self.old = self.old, self.now
         self.n_now, self.n_old = self.n_old, self.n_now  # the newest advection is yet to be written into n_now
         self.dt_old = w.dt
@@ -87,7 +89,7 @@ class Past:
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _coast(out, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old):
+def _coast(out, ahead, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old):
     nx, ny, nz = now.shape[1:]
     for x in range(3):
         for i in range(nx):
@@ -96,15 +98,14 @@ def _coast(out, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, 
                 for k in range(nz):
                     f = b * now[x, i, j, k] + b_old * old[x, i, j, k]
                     f += c * n_now[x, i, j, k] + c_old * n_old[x, i, j, k]
-                    out[x, i, j, k] = f / (s + viscosity * sz[k])
+                    u = f / (s + viscosity * sz[k])
+                    ahead[x, i, j, k] = out[x, i, j, k] = u
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _push(
-    modes, now, old, n_now, n_old, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, viscosity, b, b_old, c, c_old, scale
-):
-    """``old`` becomes the new velocity; ``modes``, the forces', become the same, filtered."""
-    nx, ny, nz = now.shape[1:]
+def _push(modes, ahead, new, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, viscosity, scale):
+    """``new`` is ``ahead`` and what the forces add; ``modes``, the forces', become the same, filtered."""
+    nx, ny, nz = new.shape[1:]
     for i in range(nx):
         for j in range(ny):
             s, d, e = alpha + viscosity * (sx[i] + sy[j]), kx[i] * kx[i] + ky[j] * ky[j], fx[i] * fy[j]
@@ -112,14 +113,13 @@ def _push(
                 u, v, w = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
                 square = d + kz[k] * kz[k]
                 p = (kx[i] * u + ky[j] * v + kz[k] * w) / square if square != 0.0 else 0.0
-                g, f = 1.0 / (s + viscosity * sz[k]), e * fz[k]
-                u, v, w = scale * (u - kx[i] * p), scale * (v - ky[j] * p), scale * (w - kz[k] * p)
-                u += b * now[0, i, j, k] + b_old * old[0, i, j, k] + c * n_now[0, i, j, k] + c_old * n_old[0, i, j, k]
-                v += b * now[1, i, j, k] + b_old * old[1, i, j, k] + c * n_now[1, i, j, k] + c_old * n_old[1, i, j, k]
-                w += b * now[2, i, j, k] + b_old * old[2, i, j, k] + c * n_now[2, i, j, k] + c_old * n_old[2, i, j, k]
-                old[0, i, j, k], modes[0, i, j, k] = g * u, f * g * u
-                old[1, i, j, k], modes[1, i, j, k] = g * v, f * g * v
-                old[2, i, j, k], modes[2, i, j, k] = g * w, f * g * w
+                g, f = scale / (s + viscosity * sz[k]), e * fz[k]
+                u = ahead[0, i, j, k] + g * (u - kx[i] * p)
+                v = ahead[1, i, j, k] + g * (v - ky[j] * p)
+                w = ahead[2, i, j, k] + g * (w - kz[k] * p)
+                new[0, i, j, k], modes[0, i, j, k] = u, f * u
+                new[1, i, j, k], modes[1, i, j, k] = v, f * v
+                new[2, i, j, k], modes[2, i, j, k] = w, f * w
     for x in range(3):
         for k in range(2):
-            old[x, 0, 0, k] = modes[x, 0, 0, k] = 0.0
+            new[x, 0, 0, k] = modes[x, 0, 0, k] = 0.0

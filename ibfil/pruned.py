@@ -38,15 +38,17 @@ def extent(occupied: np.ndarray) -> tuple[int, int]:
 
 def bounding_box(base: np.ndarray, points: int, cells: np.ndarray) -> tuple[list[int], list[int]]:
     """First cell and number of cells, per axis, of the box that holds the stencils (first index ``base`` (n, 3))."""
-    starts, sizes = [], []
-    for axis, n in enumerate(cells):
-        occupied = np.zeros(n, bool)
-        occupied[(base[:, axis, None] + np.arange(points)) % n] = True
-        start, size = extent(occupied)
-        size = -(-size // _ROOM) * _ROOM
-        starts.append(start if size < n else 0)
-        sizes.append(min(size, int(n)))
-    return starts, sizes
+    runs = [run_of_cells(base[:, axis], points, int(n)) for axis, n in enumerate(cells)]
+    return [start for start, _ in runs], [size for _, size in runs]
+
+
+def run_of_cells(first: np.ndarray, points: int, n: int) -> tuple[int, int]:
+    """First cell and number of cells of the run, on a periodic axis of n, that holds stencils from ``first`` (n,)."""
+    occupied = np.zeros(n, bool)
+    occupied[(first[:, None] + np.arange(points)) % n] = True
+    start, size = extent(occupied)
+    size = -(-size // _ROOM) * _ROOM
+    return (start, size) if size < n else (0, n)
 
 
 def is_thin(planes: int, cells: int) -> bool:

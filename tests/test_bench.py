@@ -17,6 +17,7 @@ from ibfil.errors import CaseError
         lambda: [bench.rft_step(16)],
         lambda: bench.evaluations(16, (1.1, 0.5)),
         lambda: [bench.table_pair("roma3", 1.0, 5)],
+        lambda: [bench.inertia(16)],
         lambda: bench.swimmers(end=1e-3),
     ],
 )
@@ -55,7 +56,7 @@ def test_a_part_there_is_not_is_refused():
 
 def test_json_is_json(monkeypatch, capsys):
     row = bench.Row("a", 2.0, "b", 1.0, 2.0, None)
-    for name in ("rft_step", "table_pair", "start_up"):
+    for name in ("rft_step", "table_pair", "inertia", "start_up"):
         monkeypatch.setattr(bench, name, lambda *a: row)
     monkeypatch.setattr(bench, "evaluations", lambda *a: [row])
     monkeypatch.setattr(bench, "swimmers", lambda: [row])
