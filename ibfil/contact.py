@@ -39,18 +39,21 @@ _PULL = 0.01  # of the points that repel to the middles of their segments
 
 
 class Touch(NamedTuple):
-    """The first contact: when, and the nodes next to it, counted from 0 at each filament's start."""
+    """The first contact: when, the nodes next to it, counted from 0 at each filament's start, and how near."""
 
     time: float
     one: str
     node: int
     other: str
     other_node: int
+    apart: float
+    touching: float
 
     def __str__(self) -> str:
         """As it stands in messages."""
         where = f"{self.one} node {self.node} and {self.other} node {self.other_node}"
-        return f"contact between {where} at t = {self.time:.6g}"
+        near = f"axes {self.apart:.4g} apart, contact below {self.touching:.4g} (contact.distance or the sum of radii)"
+        return f"contact between {where}, {near}, at t = {self.time:.6g}"
 
 
 def _farthest(before: np.ndarray, after: np.ndarray) -> float:
@@ -179,7 +182,8 @@ class Contact:
             rod = int(self.segments.rod[segment])
             rods.append(self._names[rod])
             nodes.append(int(self.segments.first[segment] + round(t)) - self._offsets[rod])
-        return Touch(time, rods[0], nodes[0], rods[1], nodes[1])
+        touching = float(self.segments.radius[pairs.i[k]] + self.segments.radius[pairs.j[k]])
+        return Touch(time, rods[0], nodes[0], rods[1], nodes[1], float(pairs.distance[k]), touching)
 
     def refuse_passing(self, before: State, after: State) -> None:
         """Raises NotConverged where a step from one state to the other takes a segment through another."""

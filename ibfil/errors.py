@@ -16,7 +16,8 @@ class CaseError(Exception):
 class RunFailed(Exception):
     """A run that had to stop (exit status 1).
 
-    ``time`` is in the case's unit of time, ``node`` counts from 0 at ``start``, ``advice`` says what to change.
+    ``time`` is in the case's unit of time, ``node`` counts from 0 at ``start``, ``cause`` is the likely one, ``advice``
+    says what to change.
     """
 
     def __init__(
@@ -26,18 +27,22 @@ class RunFailed(Exception):
         time: float | None = None,
         filament: str | None = None,
         node: int | None = None,
+        cause: str = "",
         advice: str = "",
     ) -> None:
         super().__init__(message)
-        self.message, self.time, self.filament, self.node, self.advice = message, time, filament, node, advice
+        self.message, self.time, self.filament, self.node = message, time, filament, node
+        self.cause, self.advice = cause, advice
 
     def __str__(self) -> str:
-        """What, when, where, and what to change, in one line each."""
+        """What, when, where; the likely cause; what to change: a line each."""
         where = ""
         if self.filament is not None:
             where = f" on filament {self.filament}" + ("" if self.node is None else f", node {self.node}")
         when = "" if self.time is None else f" at t = {self.time:.6g}"
         lines = [f"the run stopped{when}{where}: {self.message}"]
+        if self.cause:
+            lines.append(f"likely cause: {self.cause}")
         if self.advice:
             lines.append(f"what to change: {self.advice}")
         return "\n".join(lines)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 NEAR = 0.8  # ds/h below which a nearly inextensible rod locks without slip (numerics.md, 4.3)
 CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the motion
 UNEVEN = 0.02  # scatter of a straight rod's drag over places and directions, above which it is no number
+PERIODIC = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
 FINE = 0.3  # omega dt up to which the default scheme was measured to be accurate
 SOFT = 0.05  # mean square of a strain's thermal fluctuation (of stretch; of an angle between nodes): beyond, not small
 LONG = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
@@ -97,14 +98,14 @@ def warnings(simulation: Simulation) -> list[str]:
             )
         if found.get("wavelength/h", np.inf) < CELLS_A_WAVE:
             out.append(
-                f"{key}: {found['wavelength/h']:.3g} cells a wavelength: below {CELLS_A_WAVE} the rod is as "
-                "thick as its waves; take more fluid.cells"
+                f"{key}: {found['wavelength/h']:.3g} cells a wavelength (wavelength/h): below {CELLS_A_WAVE} the "
+                "rod is as thick as its waves; take more fluid.cells"
             )
         out += _of_spin(simulation, key, filament)
         if simulation.grid is not None and filament.length > min(simulation.grid.box):
             out.append(
-                f"{key}: length {filament.length:g} is more than the box ({min(simulation.grid.box):g}): the filament "
-                "meets its own periodic images; take a larger fluid.box"
+                f"{key}: length {filament.length:g} is more than the shortest side of the box, "
+                f"{min(simulation.grid.box):g}: the filament meets its own periodic images; take a larger fluid.box"
             )
         if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * FINE:
             out.append(f"time.step: omega dt = {found['omega dt']:.3g}; the schemes are accurate up to about {FINE}")
@@ -211,11 +212,31 @@ def _of_run(simulation: Simulation) -> list[str]:
     pressure = back_pressure(simulation)
     if pressure is not None:
         shown = ", ".join(f"{p:.3g}" for p in pressure)
+        assert simulation.grid is not None
+        net = float(np.linalg.norm(pressure) * np.prod(simulation.grid.box))
         out.append(
-            f"fluid.box: the rods push the fluid with a net force at the start; on a periodic box a uniform back "
-            f"pressure gradient ({shown}) carries it, so that there is no mean flow"
+            f"fluid.box: the rods push the fluid with a net force of {net:.3g} at the start (0 where nothing outside "
+            f"pulls or holds them); on a periodic box a uniform back pressure gradient ({shown}) carries it, so that "
+            "there is no mean flow; a larger box makes it weaker, in proportion to the volume"
         )
-    return out
+    return out + _of_flow(simulation)
+
+
+def _of_flow(simulation: Simulation) -> list[str]:
+    """A background flow on a periodic box that differs from face to face."""
+    flow, grid = assemble.flow(simulation.case), simulation.grid
+    if flow is None or grid is None:
+        return []
+    places = np.random.default_rng(0).uniform(-0.5, 0.5, (64, 3)) * grid.box
+    here = flow(places, simulation.time)
+    jump = max(float(np.max(np.abs(flow(places + side, simulation.time) - here))) for side in np.diag(grid.box))
+    largest = max(float(np.max(np.abs(here))), 1e-300)
+    if jump <= PERIODIC * largest:
+        return []
+    return [
+        f"fluid.flow: not periodic: it changes by {jump:.3g} from a face of the box to the one opposite (0 if it "
+        "were); the rods' images go with the rods and not with the flow where they are: take a larger fluid.box"
+    ]
 
 
 def back_pressure(simulation: Simulation) -> np.ndarray | None:

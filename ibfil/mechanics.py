@@ -55,11 +55,18 @@ class Ends(Protocol):
         """Displacements (k,) of the held unknowns between two times."""
 
 
-class TangentReversed(Exception):
-    """A tangent turned by nearly 180 degrees within one step; ``node`` says which."""
+REVERSED = 0.02  # of 1 + e3.e3', 2 where a tangent keeps its direction: below, Eq. 41 does not know which way it went
 
-    def __init__(self, node: int) -> None:
-        super().__init__(f"tangent reversed at node {node}")
+
+class TangentReversed(Exception):
+    """A tangent turned by nearly 180 degrees within one step, or is no number; ``node`` says which.
+
+    ``least`` is 1 + e3.e3' there.
+    """
+
+    def __init__(self, node: int, least: float) -> None:
+        turned = f"the tangent at a node reversed within a step: 1 + e3.e3' = {least:.2g} (allowed {REVERSED})"
+        super().__init__(turned if np.isfinite(least) else "the run diverged: a position is no finite number any more")
         self.node = node
 
 
@@ -104,8 +111,8 @@ class Mechanics:
     def move(self, start: Geometry, y: np.ndarray) -> Geometry:
         """The configuration displaced by y (n, m) from ``start``, e1 carried along and turned."""
         shape, least, where = moved(self.mesh, start, y)
-        if not least > 0.02:
-            raise TangentReversed(where)
+        if not least > REVERSED:
+            raise TangentReversed(where, least)
         return shape
 
     def moment(self, shape: Geometry, time: float) -> Moment:

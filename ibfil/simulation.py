@@ -8,9 +8,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
-from . import assemble, driving, timescales
+from . import assemble, bounds, driving, timescales
 from .camera import Camera, Moment
 from .errors import CaseError, RunFailed
 from .fluid import Held
@@ -22,28 +21,6 @@ if TYPE_CHECKING:
     from .case import Case
     from .frames import Frame
     from .laws import MomentLaw
-
-_LONGEST, _SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
-_LARGEST_TWIST = 0.95  # of sin(O3 ds): Eq. 39 stops resisting at 1
-
-
-@njit(cache=True)
-def _survey(joined, twisting, ds, r, length, twist):
-    """The largest and smallest |d|/ds, the largest |O3 ds|, the node of each; and the first node that is not finite."""
-    high, low, turn = 0.0, np.inf, 0.0
-    where = np.zeros(3, np.int64)
-    for i in range(joined.size):
-        if not np.isfinite(r[i, 0] + r[i, 1] + r[i, 2]):
-            return high, low, turn, where, i
-        if joined[i]:
-            q = length[i] / ds[i]
-            if q > high:
-                high, where[0] = q, i
-            if q < low:
-                low, where[1] = q, i
-            if twisting[i] and abs(twist[i] * ds[i]) > turn:
-                turn, where[2] = abs(twist[i] * ds[i]), i
-    return high, low, turn, where, -1
 
 
 class Simulation:
@@ -249,7 +226,7 @@ class Simulation:
 
     def give_up(self, reason: str, dt: float, node: int | None = None) -> None:
         """Raises RunFailed: no step of length dt can be taken, because of ``node`` if that is known."""
-        self._fail(f"{reason} (dt = {dt:.3g})", node, self._advice())
+        self._fail(bounds.unsolved(reason, dt, self.case.time.min_step, node, self._known(dt)))
 
     @property
     def shortened(self) -> int:
@@ -269,30 +246,25 @@ class Simulation:
         self._last = (step.velocity, step.force, step.reaction)
         self.steps += 1
         if self.steps > self.case.time.max_steps:
-            self._fail(
-                f"time.max_steps = {self.case.time.max_steps} steps are taken",
-                None,
-                "a larger time.max_steps, a longer time.step, or a larger time.tolerance",
-            )
+            message = f"{self.steps} steps are taken (allowed: time.max_steps = {self.case.time.max_steps})"
+            cause = f"steps of {time - before.time:.3g} for a time.end of {self.case.time.end:g}"
+            cure = "a larger time.max_steps, a longer time.step, or a larger time.tolerance"
+            self._fail(bounds.Trouble(message, None, cause, cure))
         self._iterations = step.iterations
-        shape, mesh = step.state.shape, self.mechanics.mesh
-        high, low, turn, where, bad = _survey(mesh.joined, self._twisting, mesh.ds, shape.r, shape.length, shape.twist)
-        if bad >= 0:
-            self._fail("a position is not finite: the run diverged", bad, self._advice())
-        if high > _LONGEST or low < _SHORTEST:
-            at, ratio = (where[0], high) if high > _LONGEST else (where[1], low)
-            self._fail(
-                f"a segment is {ratio:.3g} times its rest length (allowed {_SHORTEST} to {_LONGEST})",
-                int(at),
-                self._advice(),
-            )
-        if turn > _LARGEST_TWIST:
-            self._fail(
-                f"the twist between two nodes nears a quarter turn (sin = {turn:.3g}), where Eq. 39 stops resisting",
-                int(where[2]),
-                "more nodes, a shorter time.step, or a slower spin",
-            )
+        self._look_at_bounds(step.state.shape, time - before.time)
         self._watch(before)
+
+    def _look_at_bounds(self, shape: Geometry, dt: float) -> None:
+        found = bounds.out_of_bounds(self.mechanics.mesh, self._twisting, shape)
+        if found is not None:
+            stiffness = float(self.mechanics.stretching[found[1]])
+            self._fail(bounds.trouble(*found, self._known(dt), stiffness))
+
+    def _known(self, dt: float) -> bounds.Step:
+        """What is known of a step that failed; the limit is that of the start, where the present is not finite."""
+        explicit = self.case.time.scheme == "explicit"
+        limit = timescales.explicit_limit(self.mechanics, self.fluid, self._rods.start, 0.0) if explicit else np.inf
+        return bounds.Step(dt, limit)
 
     def _look_at_crossing(self, dt: float) -> None:
         """Tells, once, of a given step in which the fluid moves too far for its extrapolated advection."""
@@ -315,22 +287,13 @@ class Simulation:
         """How many pairs of segments touch now; zero where the case has no [contact]."""
         return 0 if self._rods.contact is None else self._rods.contact.near(self.shape.r).i.size
 
-    def _advice(self) -> str:
-        if self.case.time.scheme == "explicit":
-            return f"time.step below {self.explicit_limit_or_nan():.3g} (the explicit limit), or time.scheme=implicit"
-        return "a shorter time.step; if it persists, check stretching, loads and viscosity"
-
-    def explicit_limit_or_nan(self) -> float:
-        """The explicit limit at the start shape, for messages when the present one is no longer finite."""
-        return timescales.explicit_limit(self.mechanics, self.fluid, self._rods.start, 0.0)
-
-    def _fail(self, message: str, node: int | None, advice: str) -> None:
+    def _fail(self, trouble: bounds.Trouble) -> None:
+        message, node, cause, cure = trouble
         if node is None:
-            raise RunFailed(message, time=self.time, advice=advice)
+            raise RunFailed(message, time=self.time, cause=cause, advice=cure)
         k = next(k for k, where in enumerate(self._rods.nodes) if node < where.stop)
-        where = self._rods.nodes[k]
-        name = self._rods.names[k]
-        raise RunFailed(message, time=self.time, filament=name, node=node - where.start, advice=advice)
+        name, first = self._rods.names[k], self._rods.nodes[k].start
+        raise RunFailed(message, time=self.time, filament=name, node=node - first, cause=cause, advice=cure)
 
     # -- what is looked at ---------------------------------------------------------------------------------------
 

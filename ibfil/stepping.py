@@ -248,4 +248,7 @@ class Implicit:
                 return y, answer, count
             shape, clip, last = equation.rods.move(equation.start, y), False, size
         worst = int(np.argmax(np.max(np.abs(answer.move), axis=1)))
-        raise NotConverged(f"no convergence in {count} iterations, last correction {size:.2g}", worst)
+        still = f"Newton's correction is still {size:.2g} of the length (allowed {self.tolerance:g})"
+        if not np.isfinite(size):
+            still = "the run diverged: a correction is no finite number"
+        raise NotConverged(f"{still} after {count} iterations", worst)

@@ -125,7 +125,8 @@ class TorqueFree(Mechanics):
         turn = np.ascontiguousarray(y[:, 3]) if self.unknowns == 4 else np.zeros(len(r))
         e1, least = carry(start.e1, start.e3, b.e3, turn)
         if not min(least, b.least) > 0.02:
-            raise TangentReversed(int(np.argmin(_dot(start.e3, b.e3))))
+            along = 1.0 + _dot(start.e3, b.e3)
+            raise TangentReversed(int(np.argmin(along)), float(np.min(along)))
         return measure(self.mesh, r, e1)
 
     def _tension(self, g: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:

@@ -62,7 +62,7 @@ def test_stop_ends_the_run_at_the_first_contact_and_says_where():
     """Each falls at speed 1 across 0.2: axes are 0.05 apart at t = 0.175."""
     result, _ = ran(case(crossed(0.4, 4 * np.pi), {"distance": 0.05}))
     assert result.status == "stopped"
-    match = re.fullmatch(r"contact between (\w+) node (\d+) and (\w+) node (\d+) at t = (.*)", result.reason)
+    match = re.fullmatch(r"contact between (\w+) node (\d+) and (\w+) node (\d+), .*, at t = (.*)", result.reason)
     assert match is not None
     assert {match[1], match[3]} == {"upper", "lower"}
     assert {match[2], match[4]} <= {"5", "6"}  # they cross between these
@@ -166,7 +166,7 @@ def test_a_rod_touches_itself(angle, status):
     ring = {"nodes": 60, "shape": {"kind": "circle", "curvature": 2 * np.pi * angle}}
     result, _ = ran(case({"ring": ring}, {"distance": 0.02}, step=1e-5, end=1e-5, every=1e-5))
     assert result.status == status
-    assert result.reason in ("", "contact between ring node 0 and ring node 59 at t = 0")
+    assert result.reason.partition(",")[0] in ("", "contact between ring node 0 and ring node 59")
 
 
 def test_images_touch_where_the_fluid_is_a_box():

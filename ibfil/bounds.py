@@ -1,0 +1,112 @@
+"""When a run is out of bounds: what was found, the limit, the likely cause, the key to change. Each in one place.
+
+The README lists these with what `ibfil check` warns of (groups.py) and what a case is refused for (case_checks.py).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from .geometry import Geometry
+from .rods import Mesh
+
+LONGEST, SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
+LARGEST_TWIST = 0.95  # of sin(O3 ds): Eq. 39 stops resisting at 1
+UNBOUNDED = "a load, a law or a flow that grows without bound, or has no value, where the rod has come to"
+
+
+class Trouble(NamedTuple):
+    """A step that led out of bounds: what was found and allowed, at which node if one is to blame, why, the cure."""
+
+    message: str
+    node: int | None
+    cause: str
+    cure: str
+
+
+class Step(NamedTuple):
+    """What is known of the step: its length, the scheme's limit (infinite where it has none)."""
+
+    dt: float
+    limit: float
+
+    def cause(self, otherwise: str) -> str:
+        """The likely cause: a step above the limit where there is one."""
+        if self.dt > self.limit:
+            return f"dt = {self.dt:.3g} is above the explicit scheme's limit, {self.limit:.3g} at the start shape"
+        return otherwise
+
+    def cure(self, otherwise: str) -> str:
+        """What to change then."""
+        if self.dt > self.limit:
+            return f"time.step below {self.limit:.3g}, or time.scheme=implicit"
+        return otherwise
+
+
+@njit(cache=True)
+def _survey(joined, twisting, ds, r, length, twist):
+    """The largest and smallest |d|/ds, the largest |O3 ds|, the node of each; and the first node that is not finite."""
+    high, low, turn = 0.0, np.inf, 0.0
+    where = np.zeros(3, np.int64)
+    for i in range(joined.size):
+        if not np.isfinite(r[i, 0] + r[i, 1] + r[i, 2]):
+            return high, low, turn, where, i
+        if joined[i]:
+            q = length[i] / ds[i]
+            if q > high:
+                high, where[0] = q, i
+            if q < low:
+                low, where[1] = q, i
+            if twisting[i] and abs(twist[i] * ds[i]) > turn:
+                turn, where[2] = abs(twist[i] * ds[i]), i
+    return high, low, turn, where, -1
+
+
+def out_of_bounds(mesh: Mesh, twisting: np.ndarray, shape: Geometry) -> tuple[str, int, float] | None:
+    """Which bound the configuration is beyond, at which node, and the number found; None within all of them."""
+    high, low, turn, where, bad = _survey(mesh.joined, twisting, mesh.ds, shape.r, shape.length, shape.twist)
+    if bad >= 0:
+        return "finite", bad, np.nan
+    if high > LONGEST:
+        return "stretch", int(where[0]), high
+    if low < SHORTEST:
+        return "stretch", int(where[1]), low
+    if turn > LARGEST_TWIST:
+        return "twist", int(where[2]), turn
+    return None
+
+
+def trouble(kind: str, node: int, found: float, step: Step, stiffness: float) -> Trouble:
+    """The words for `out_of_bounds`; ``stiffness`` is EA at the node."""
+    if kind == "finite":
+        message = f"the run diverged: a position is no finite number any more (dt = {step.dt:.3g})"
+        return Trouble(message, node, step.cause(UNBOUNDED), step.cure("the loads, law or fluid.flow"))
+    if kind == "stretch":
+        message = f"a segment is {found:.3g} times its rest length (allowed {SHORTEST} to {LONGEST})"
+        pull = abs(found - 1.0) * stiffness
+        cause = step.cause(
+            f"the rod is pulled or pressed with about {pull:.3g}, more than its EA = {stiffness:.3g} bears"
+        )
+        return Trouble(message, node, cause, step.cure("a larger stretching, smaller loads, or a shorter time.step"))
+    message = f"the twist between two nodes nears a quarter turn: sin = {found:.3g} (allowed {LARGEST_TWIST})"
+    cause = "the rod is wound up faster than it unwinds, until Eq. 39 stops resisting"
+    return Trouble(message, node, step.cause(cause), step.cure("more nodes, a slower spin, a larger twisting"))
+
+
+def unsolved(reason: str, dt: float, smallest: float, node: int | None, step: Step) -> Trouble:
+    """A step that Newton's iteration or the linear solve did not find, however short."""
+    message = f"{reason} (dt = {dt:.3g}; time.min_step = {smallest:.3g} ends the halving)"
+    if "diverged" in reason:
+        return Trouble(
+            message, node, step.cause(UNBOUNDED), step.cure("the loads, law or fluid.flow, or a shorter time.step")
+        )
+    cause = "a rod that snaps, or loads, a law or contact stiffer than any step: no shorter one helped"
+    return Trouble(
+        message,
+        node,
+        step.cause(cause),
+        step.cure("softer loads or law, more nodes, or a smaller time.step and time.min_step"),
+    )
