@@ -311,7 +311,7 @@ def coupling(case: Case, stacked: Stacked) -> Coupling:
         twists[where] = filament.twisting is not None
         if filament.radius is not None:
             radius[where] = alone(filament.radius, stacked.s[where])
-    spin = own_spin(radius, widest, case.fluid.viscosity, volume)
+    spin = own_spin(radius, widest, case.fluid.slip, case.fluid.viscosity, volume)
     # Where a filament does not twist its turn is held; any positive number will do for the row.
     return Stirring(np.where(twists > 0, spin, 1.0), twists)
 
@@ -331,8 +331,8 @@ def spacing(case: Case) -> float:
 
 
 def twist_radius(case: Case) -> float:
-    """The radius of the cylinder that a line of torques on the case's grid spins like."""
-    return kernel(case).twist_radius * spacing(case)
+    """The largest radius that a rod on the case's grid has when it spins: the kernel's, less by the slip."""
+    return kernel(case).twist_radius * spacing(case) / float(np.sqrt(1.0 + case.fluid.slip))
 
 
 def fields(case: Case, fluid: Fluid, grid: Grid) -> GridFields:

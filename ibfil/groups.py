@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.8  # ds/h below which a nearly inextensible rod locks without slip (numerics.md, 4.3)
 CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the motion
+FULL = 0.98  # of the grid's twist radius, above which a rod's own spin does not keep its torques from locking
 UNEVEN = 0.02  # scatter of a straight rod's drag over places and directions, above which it is no number
 PERIODIC = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
 FINE = 0.3  # omega dt up to which the default scheme was measured to be accurate
@@ -131,11 +132,18 @@ def _of_spin(simulation: Simulation, key: str, filament) -> list[str]:
         return []
     widest = assemble.twist_radius(case)
     largest = float(np.max(filament.radius.bind("s", "t")(np.linspace(0.0, filament.length, 11), 0.0)))
-    if largest <= widest * (1 + 1e-9):
-        return []
+    out = []
+    if case.fluid.slip == 0 and largest > FULL * widest:
+        out.append(
+            f"{key}: fluid.slip = 0, and the rod is as thick as the grid makes it spin: torques that change sign from "
+            "node to node lock it; set fluid.slip = 0.01, or take a smaller radius"
+        )
+    if largest <= widest * 1.001:
+        return out
     return [
+        *out,
         f"{key}.radius: {largest:.4g} is above {widest:.4g}, the radius that a rod on this grid has when it spins: "
-        'it spins as one of that; take fewer fluid.cells, a wider fluid.kernel, or fluid.rotation = "local"'
+        'it spins as one of that; take fewer fluid.cells, a wider fluid.kernel, or fluid.rotation = "local"',
     ]
 
 

@@ -200,7 +200,7 @@ def _costs(simulation: Simulation) -> list[str]:
         lines.append(f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {h:.4g}")
         lines.append(
             f"a rod on it is as thick as its kernel: radius {kernel.line_radius * h:.4g} when dragged, "
-            f"{kernel.twist_radius * h:.4g} when spun by the grid; no one radius of RFT has both"
+            f"{assemble.twist_radius(case):.4g} when spun by the grid; no one radius of RFT has both"
         )
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())

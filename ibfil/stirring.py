@@ -15,8 +15,11 @@ what the fluid between a and b slips,
 
     c = [1/(4 pi eta a^2) - 1/(4 pi eta b^2)]/Lc
 
-and one alone spins against 4 pi eta a^2, as in resistive-force theory. A rod with a >= b has c = 0 and the grid's
-radius: a negative c would make the mobility of short twists negative.
+and one alone spins against 4 pi eta a^2, as in resistive-force theory.
+
+Torques of nodes less than some cells apart lock as forces do (numerics.md, 4.3): the grid hardly sees what changes sign
+from node to node, and a prescribed spin is then answered by torques that do, twenty times too large. So c is at least
+eps/(4 pi eta b^2 Lc) with the eps of the slip: a rod spins as one of radius b/sqrt(1 + eps) at most.
 
 The curl is spectral, with the derivative's wave numbers of grid.py (zero at Nyquist), so that these blocks of the
 mobility table equal the FFTs to round-off: with K^2 the true square,
@@ -178,9 +181,13 @@ class StirredSolve:
         return np.hstack([interpolate(base, weights, t.backward()) for t in (self._flow, self._spin)])
 
 
-def own_spin(radius: np.ndarray, twist_radius: float, viscosity: float, volume: np.ndarray) -> np.ndarray:
-    """c (n,): the spin per torque that rods of ``radius`` (n,) have beyond the grid's; zero above the twist radius."""
-    return np.maximum(1.0 / radius**2 - 1.0 / twist_radius**2, 0.0) / (4 * np.pi * viscosity * volume)
+def own_spin(radius: np.ndarray, widest: float, slip: float, viscosity: float, volume: np.ndarray) -> np.ndarray:
+    """c (n,): the spin per torque that rods of ``radius`` (n,) have beyond the grid's, of which ``slip`` at least.
+
+    ``widest`` is b/sqrt(1 + slip), the largest radius that a rod has when it spins, ``volume`` (n,) control volumes.
+    """
+    inside = 1.0 / np.minimum(radius, widest) ** 2 - 1.0 / (widest**2 * (1.0 + slip))
+    return inside / (4 * np.pi * viscosity * volume)
 
 
 class Stirring:
