@@ -191,7 +191,7 @@ class Simulation:
     def _choose_march(self) -> EvenSteps | ControlledSteps:
         step, time = self._choose_step(), self.case.time
         if time.tolerance is None:
-            return EvenSteps(step)
+            return EvenSteps(step, 2.0 if self._stepper.order == 2 else np.inf)
         rate = 2 * np.pi / (timescales.POINTS_A_PERIOD * step)
         return ControlledSteps(time.tolerance, rate, time.end, time.order, self.mechanics.length)
 

@@ -266,6 +266,7 @@ class StokesByKrylov(StokesByFFT):
 
     def _make(self, source: _Source) -> None:
         self._source = source
+        self._kept.blocks = None  # two of them at a time would be the most of a run's memory
         self._kept.renew(self._factored(source.nodes, source.tau, source.rods, self.fluid.rods), source.tau)
 
     def memory(self) -> dict[str, np.ndarray | float]:

@@ -6,6 +6,7 @@ import pytest
 from ibfil.case import parse_case
 from ibfil.errors import RunFailed
 from ibfil.simulation import Simulation
+from ibfil.stepping import NotConverged
 
 SWIMMER = """
 [filament.rod]
@@ -155,3 +156,43 @@ def test_a_step_that_cannot_be_solved_is_halved_and_told_and_given_up_at_the_flo
     with pytest.raises(RunFailed, match=r"dt = 0\.2") as failure:
         _simulation(rod, 0.2, "step = 0.2\nmin_step = 0.15").advance(0.2, lambda: None)
     assert failure.value.advice
+
+
+class Failing(Simulation):
+    """Steps longer than ``most`` fail until ``until``; ``taken`` are those that did not."""
+
+    most, until = 0.003, 0.045
+    taken: tuple[float, ...] = ()
+
+    def attempt(self, dt):
+        if self.time < self.until and dt > self.most:
+            raise NotConverged("as asked", 0)
+        return super().attempt(dt)
+
+    def accept(self, step, time):
+        self.taken = (*self.taken, step.state.dt_old)
+        super().accept(step, time)
+
+
+def test_a_step_is_at_most_twice_the_one_before():
+    """After halved steps, and after two outputs close to each other: with dt/dt_old > 2.41 BDF2 is unstable."""
+    simulation = Failing(parse_case(SWIMMER + REST.format(end=0.4, time="step = 0.02"), "test.toml"))
+    for until in (0.2, 0.201, 0.4):
+        simulation.advance(until, lambda: None)
+        assert simulation.time == until
+    taken = np.array(simulation.taken)
+    assert simulation.shortened > 0
+    assert taken.max() == pytest.approx(0.02, rel=0.02)
+    assert (taken[1:] / taken[:-1]).max() < 2 + 1e-9
+    assert (taken[1:] / taken[:-1]).max() > 1.9
+    assert taken.sum() == pytest.approx(0.4)
+    assert len(taken) < 60
+
+
+def test_schemes_of_order_1_need_no_such_bound():
+    time = 'step = 0.02\nscheme = "semi-implicit"'
+    simulation = Failing(parse_case(SWIMMER + REST.format(end=0.4, time=time), "test.toml"))
+    simulation.until = 0.0
+    for until in (0.2, 0.201, 0.4):
+        simulation.advance(until, lambda: None)
+    assert simulation.steps == 10 + 1 + 10
