@@ -22,14 +22,25 @@ def _average(kernel, r):
     return averaged.mobility(table, GRID.cells, GRID.coordinates(r), np.zeros(len(r)))
 
 
-@pytest.mark.parametrize(("name", "error"), [("peskin4", 4e-3), ("bkp6", 1e-3)])
-def test_the_averaged_table_is_off_by_what_is_stated(name, error):
-    """3.6e-3 (peskin4) and 2.8e-4 (bkp6) in ib_numerics.md, section 1, for its swimmer; 6e-4 (bkp6) for this row."""
-    kernel, rng = KERNELS[name], np.random.default_rng(2)
-    r = np.linspace(-0.5, 0.5, 21)[:, None] * [0.6, 0.5, 0.6] + rng.uniform(-0.05, 0.05, 3)
-    exact, average = _exact(kernel, r), _average(kernel, r)
-    found = np.linalg.norm(exact - average) / np.linalg.norm(exact)
-    assert error / 20 < found < error
+STATED = {"peskin4": (3.6e-3, 1.0e-2), "roma3": (1.1e-2, 2.7e-2), "bkp6": (2.8e-4, 7e-4), "es6": (2.6e-4, 7e-4)}
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_the_averaged_table_is_off_by_what_is_stated(name):
+    """The swimmer of ib_numerics.md, section 1: 41 nodes, 64^3; over the matrix, and the largest over a node's own.
+
+    Where it lies in its cell changes the first by a quarter (peskin4 3.0e-3 to 4.6e-3), so the mean over eight places.
+    """
+    kernel, grid, none = KERNELS[name], Grid([3.2] * 3, [64] * 3), np.zeros(41)
+    response = mobility.point_response(grid, 1.0)
+    exact, average = mobility.octant(response, kernel.points), averaged.table(response, kernel)
+    r = Simulation(swimmer()).shape.r
+    places, errors = np.random.default_rng(0).uniform(0, grid.spacing, (8, 3)), []
+    for x in r - r.mean(axis=0) + places[:, None]:
+        one = mobility.mobility(exact, grid.cells, *kernel.stencil(grid.coordinates(x)), none)
+        two = averaged.mobility(average, grid.cells, grid.coordinates(x), none)
+        errors.append((np.linalg.norm(one - two) / np.linalg.norm(one), np.abs(one - two).max() / np.abs(one).max()))
+    assert np.mean(errors, axis=0) == pytest.approx(STATED[name], rel=0.15)
 
 
 @pytest.mark.parametrize("name", sorted(KERNELS))
