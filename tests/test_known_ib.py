@@ -186,6 +186,27 @@ def test_the_explicit_limit_on_the_papers_grid(slip, rate):
     assert limit == pytest.approx(2 / rate, rel=0.05)
 
 
+@pytest.mark.parametrize("slip", [0.0, 0.01])
+@pytest.mark.parametrize("viscosity", [1e-2, 0.1, 1.0, 10.0, 1e2])
+def test_explicit_steps_within_five_per_cent_of_the_limit_are_stable_below_and_not_above(viscosity, slip):
+    """About a straight rod: the stiffest motion is multiplied by 1 - 2 dt/limit each step, in 200 by 0.9^200 or 2e8."""
+    fluid = {"model": "stokes", "box": [3.2] * 3, "cells": [64] * 3, "slip": slip, "method": "table"}
+    ripple = "1e-12*cos(40*pi*s) + 1e-12*sin(13*s)"
+    rod = {"length": 1.0, "nodes": 41, "bending": 1.0, "stretching": 400.0, "position": [0.017, 0.021, 0.033]}
+    rod["shape"] = {"kind": "straight", "perturb": [ripple, ripple, 0]}
+    limit = Simulation(scene({"rod": rod}, fluid, viscosity=viscosity, step=1e-3)).explicit_limit()
+    moved = []
+    for factor in (0.95, 1.05):
+        step = factor * limit
+        case = scene({"rod": rod}, fluid, viscosity=viscosity, scheme="explicit", step=step, end=200 * step)
+        simulation = Simulation(case)
+        before = simulation.shape.r
+        simulation.advance(case.time.end, lambda: None)
+        moved.append(np.abs(simulation.shape.r - before).max())
+    assert moved[0] < 1e-10  # without slip a decaying motion may first grow fortyfold
+    assert moved[1] > 1e-7
+
+
 # --- locking ---------------------------------------------------------------------------------------------------------
 
 
