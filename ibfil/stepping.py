@@ -163,8 +163,8 @@ def _stride(move: np.ndarray, shape: Geometry) -> float:
 class Implicit:
     """Backward Euler (order 1) or variable-step BDF2 (order 2): Newton on the force, M frozen where the rods will be.
 
-    M is taken at the extrapolated positions. It begins there, and goes on while each correction is less than half of
-    the one before; a matrix serves again where the fluid keeps its factors and corrections shrink by ``again``.
+    M is taken at the extrapolated positions. It begins there, and goes on while corrections shrink fast; a matrix
+    serves again where the fluid keeps its factors and corrections shrink by ``again``.
 
     Where that fails it begins at the start of the step: the first iteration leaves compressive geometric stiffness out
     of the matrix, and so does any that makes the correction grow. Where that fails too, as on soft rods of many nodes,
@@ -208,7 +208,10 @@ class Implicit:
             return self._newton(equation, ahead, there, self.stride)
 
     def _quickly(self, equation: _Equation, y: np.ndarray, shape: Geometry) -> tuple[np.ndarray, Answer, int]:
-        """From y, where the rods have ``shape``, to the solution, while corrections halve at least."""
+        """From y, where the rods have ``shape``, to the solution, while corrections halve at least, then quarter.
+
+        Where they shrink more slowly another solution may be on the way, as where a soft rod kinks.
+        """
         rods, last, rate, exact = equation.rods, _size(y, equation.rods.length), np.inf, 0
         for count in range(1, self.most + 1):
             force, inner = rods.forces(shape, equation.time)
@@ -218,7 +221,7 @@ class Implicit:
             answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
             size = _size(answer.move, rods.length)
             rate = size / max(last, self.tolerance)
-            if not rate < 0.5:
+            if not rate < (0.5 if count <= 2 else 0.25):
                 break
             y = y + answer.move
             # An exact matrix squares the error, a matrix of before takes the same part of it each time.

@@ -153,7 +153,7 @@ def judge(cell: Cell) -> Verdict:
 
 STEPS = (0.3, 0.1, 0.03)
 ETAS = (1e-3, 0.1, 1.0, 10.0, 100.0, 1e3)
-GRIDS = [(20, 2.0), (20, 1.0), (41, 0.5), (100, 0.25), (200, 0.1)]  # N, ds/h
+GRIDS = [(20, 2.0), (20, 1.0), (41, 0.5), (100, 0.25), (200, 0.1), (400, 0.1)]  # N, ds/h
 Table = tuple[str, list[dict[str, Any]], list[dict[str, Any]], tuple[float, ...], partial]
 
 
@@ -189,6 +189,13 @@ TABLES: list[Table] = [
         [{"nodes": n, "apart": apart, "stretching": ea} for n, apart in GRIDS[1:3] for ea in (50.0, 1.6e4, 1e6)],
         (0.25,),
         partial(Cell, fluid="navier-stokes"),
+    ),
+    (
+        "stokes swimmer, fine steps",
+        [{"nodes": n, "apart": apart, "eta": eta} for n, apart in GRIDS[:4] for eta in (1e-3, 1.0, 1e3)],
+        _named(stretching=(50.0, 1.6e4, 1e6)),
+        (0.03,),
+        partial(Cell, fluid="stokes"),
     ),
     (
         "stokes ribbon",

@@ -35,6 +35,8 @@ RIBBONS = [
     Cell("ribbon", eta=1.0, flat=100.0, radius=1e-3),
     Cell("ribbon", eta=0.1, flat=10.0, radius=0.1, stretching=50.0),
     Cell("ribbon", eta=1e3, flat=10.0, radius=1e-3),
+    # Where it kinks, a quarter of this step leads from the extrapolation to another solution, which collapses.
+    Cell("ribbon", stretching=50.0, radius=1e-3, step=0.1),
     Cell("ribbon", "stokes", eta=1.0, flat=100.0, nodes=20),
     Cell("ribbon", "stokes", eta=1e3, radius=1e-3, nodes=20),
 ]
