@@ -175,7 +175,8 @@ def memory(simulation: Simulation) -> dict[str, float]:
     if case.fluid.model == "navier-stokes":
         modes = 3 * 16.0 * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
         out["past of the fluid, as large in a checkpoint"] = 4 * modes
-        out["its transforms"] = 2 * modes * (6 + 3 * (parts - 3)) / 3
+        out["its transforms"] = modes + 2 * modes * (6 + 3 * (parts - 3)) / 3
+        out["mobility table"] *= 2  # of Euler's first step, and of BDF2's
     elif simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
         out["fields and their transforms"] = (parts - 2) * 2 * 3 * 8.0 * float(np.prod(cells))
     return out
@@ -224,6 +225,11 @@ def _steps(simulation: Simulation) -> list[str]:
         f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
     ]
+    if case.fluid.model == "navier-stokes":
+        given = "told" if case.time.step != "auto" and case.time.tolerance is None else "steps are shortened for it"
+        lines.append(
+            f"advection is extrapolated: stable while the fluid crosses less than about a cell a step ({given})"
+        )
     rates = simulation.driving_rates()
     if rates and max(rates) > 0:
         lines.append(f"shortest period of what drives the rods: {2 * np.pi / max(rates):.4g}")

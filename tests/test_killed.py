@@ -50,6 +50,21 @@ def test_killed_at_any_moment_it_goes_on_from_its_checkpoint(path, uncut):
     assert content(path) == content(uncut)
 
 
+def test_a_fluid_with_a_past_goes_on_after_kill_as_if_never_killed(tmp_path):
+    short = ["time.end=0.4", "time.step='auto'", "fluid.cells=[32,32,32]", "output.every=0.02"]
+    case_file, command = HERE.parent / "cases/inertia/swimmer_re_10.toml", [sys.executable, "-m", "ibfil", "run"]
+    env = os.environ | {"PYTHONPATH": str(HERE.parent)}
+    whole, killed = tmp_path / "whole.h5", tmp_path / "killed.h5"
+    changes = [*short, "output.checkpoint_every=1e-9"]
+    subprocess.run([*command, case_file, *changes, "-o", whole], env=env, check=True, capture_output=True)
+    victim = subprocess.Popen([*command, case_file, *changes, "-o", killed], env=env, stdout=subprocess.DEVNULL)
+    wait_for(lambda: checkpoint_path(killed).exists() and checkpoint.read(checkpoint_path(killed)).steps > 2, 120.0)
+    victim.kill()
+    assert victim.wait() == -signal.SIGKILL
+    subprocess.run([*command, "--resume", killed], env=env, check=True, capture_output=True)
+    assert content(killed) == content(whole)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 8))
 def test_killed_many_times_over(path, uncut, seed):
