@@ -182,6 +182,8 @@ def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None)
         return drag.perp, drag.par, spin if drag.spin is None else np.full(1, drag.spin)
     found = matching(case, filament)
     if found is not None:
+        if radius is not None and found.spin:
+            spin = eta * found.spin * (radius / np.mean(radius)) ** 2
         return eta * found.perp, eta * found.par, spin
     if drag == "slender":
         if radius is None:
@@ -203,9 +205,12 @@ def matching(case: Case, filament: Filament) -> Match | None:
 
     box, cells = case.fluid.box, case.fluid.cells or cells_of_thickness(case)
     assert box is not None
-    nodes = 1 + round(drag.matched * (filament.nodes - 1) / filament.length)
+    nodes, radius = 1 + round(drag.matched * (filament.nodes - 1) / filament.length), 0.0
+    if case.fluid.rotation == "grid" and filament.twisting is not None and filament.radius is not None:
+        radius = float(np.mean(alone(filament.radius, np.linspace(0.0, filament.length, filament.nodes))))
+    rod = matched.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip, radius)
     try:
-        return matched.match(matched.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip))
+        return matched.match(rod)
     except ValueError as error:
         allowed = "slip = 0.01, fewer nodes or more cells"
         raise CaseError([f"{case.file}: fluid.drag: {error}; allowed: {allowed}"]) from None

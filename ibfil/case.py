@@ -103,7 +103,9 @@ def idle_keys(case: Case) -> list[str]:
     idle: dict[str, list[str]] = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
     if fluid.model == "rft":
         grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "kernel", "slip"]
-        idle["fluid"] += [*grid, "method", "precision", "rotation"]
+        idle["fluid"] += [*grid, "method", "precision"]
+        spins = isinstance(fluid.drag, Matched) and fluid.rotation == "grid"
+        idle["fluid"] += [] if spins and any(f.twisting for f in case.filaments.values()) else ["rotation"]
         idle["output"] += ["grid_every", "fields", "grid_stride", "probes"]
     else:
         turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())

@@ -54,6 +54,8 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
     if matched is not None:
         out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
         out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
+        if matched.spin:
+            out["matched zeta_r/eta"] = matched.spin
     return out
 
 

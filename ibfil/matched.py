@@ -10,6 +10,9 @@ along the three axes, the six diagonals of faces and the four of the cube, weigh
 directions; the scatter is the standard deviation. It scales with the viscosity, so it is measured once, at 1, and
 kept in the user's cache folder.
 
+Where twist torques go onto the grid (rotation = "grid") the rod is spun about itself too: the torques that turn all its
+nodes at unit rate, ends and the rod's own radius included, are its drag against spin.
+
 RFT knows no interaction between parts of a rod but through these numbers: they are smaller for a longer rod, and the
 right length is one over which a rod moves as one, a wavelength (ib_numerics.md, section 7).
 """
@@ -31,7 +34,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
-from . import __version__, mobility
+from . import __version__, mobility, stirring
 from .grid import Grid
 from .immersed import slip_mobility
 from .kernels import KERNELS
@@ -49,16 +52,22 @@ class Rod:
     cells: tuple[int, int, int]
     kernel: str
     slip: float
+    radius: float = 0.0  # that it spins with, below the kernel's scale; 0: its spin is not asked for
 
 
 @dataclass(frozen=True)
 class Match:
-    """Drag per length over viscosity, across and along the rod, and the standard deviations relative to them."""
+    """Drag per length over viscosity, across and along the rod, and the standard deviations relative to them.
+
+    ``spin`` is that against spin about the rod, 0 where it was not asked for.
+    """
 
     perp: float
     par: float
     perp_scatter: float
     par_scatter: float
+    spin: float = 0.0
+    spin_scatter: float = 0.0
 
     @property
     def ratio(self) -> float:
@@ -67,8 +76,8 @@ class Match:
 
     @property
     def scatter(self) -> float:
-        """The larger of the two relative standard deviations."""
-        return max(self.perp_scatter, self.par_scatter)
+        """The largest of the relative standard deviations."""
+        return max(self.perp_scatter, self.par_scatter, self.spin_scatter)
 
 
 @lru_cache
@@ -100,7 +109,38 @@ def measure(rod: Rod) -> Match:
     par, *perp = np.transpose(drags)
     across, across_scatter = _mean(np.concatenate(perp), np.tile(weights, 2))
     along, along_scatter = _mean(par, np.array(weights))
-    return Match(across, along, across_scatter, along_scatter)
+    return Match(across, along, across_scatter, along_scatter, *(_spin(rod, grid) if rod.radius else (0.0, 0.0)))
+
+
+def _spin(rod: Rod, grid: Grid) -> tuple[float, float]:
+    """The drag against spin, from the torques that turn all nodes at unit rate (stirring.py), and its scatter."""
+    kernel, ds = KERNELS[rod.kernel], rod.length / (rod.nodes - 1)
+    volume = np.full(rod.nodes, ds)
+    volume[[0, -1]] *= 0.5
+    own = np.zeros((rod.nodes, 4))
+    widest = kernel.twist_radius * grid.spacing / math.sqrt(1.0 + rod.slip)
+    own[:, 3] = stirring.own_spin(np.full(rod.nodes, rod.radius), widest, rod.slip, 1.0, volume)
+    response = [mobility.point_response(grid, 1.0), stirring.torque_response(grid, 1.0)]
+    table = mobility.octant(np.concatenate(response), kernel.points)
+    s = np.linspace(-0.5 * rod.length, 0.5 * rod.length, rod.nodes)[:, None]
+    drags, weights = [], []
+    for weight, frame in directions():
+        for place in places(PLACES):
+            base, phi = kernel.stencil(grid.coordinates(s * frame[0] + place * grid.spacing))
+            whole = stirring.mobility(table, grid.cells, base, phi, np.tile(frame[0], (rod.nodes, 1)), own)
+            drags.append(_against(whole[:, 3, :, 3]))
+            weights.append(weight)
+    return _mean(np.array(drags) / rod.length, np.array(weights))
+
+
+def _against(mobility: np.ndarray) -> float:
+    """The sum of what moves all n nodes at unit rate, with the mobility (n, n). Raises ValueError."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LinAlgWarning)
+        try:
+            return float(solve(mobility, np.ones(len(mobility)), assume_a="pos").sum())
+        except (LinAlgError, LinAlgWarning):
+            raise ValueError("the mobility of a straight rod's nodes on this grid is singular") from None
 
 
 def _mean(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from scenes import scene
 
 from ibfil import assemble, matched
+from ibfil.case import idle_keys
 from ibfil.errors import CaseError
 from ibfil.grid import Grid
 from ibfil.groups import groups, warnings
@@ -278,3 +280,39 @@ def test_a_grid_that_cannot_tell_is_a_fault_of_the_case():
     made = case(fluid={**GRID, "slip": 0}, rods={"rod": {**ROD, "nodes": 81}})
     with pytest.raises(CaseError, match=r"fluid\.drag: .* singular; allowed: slip = 0\.01"):
         Simulation(made)
+
+
+# --- spin ------------------------------------------------------------------------------------------------------------
+
+
+def test_spin_is_that_of_a_rod_spun_through_the_grid():
+    """4 pi a^2, and 3 b more of length for the ends of a rod as thick as the grid's b; none for a thin one."""
+    b = 1.504506 * 0.1 / np.sqrt(1.01)
+    found = {}
+    for length, nodes in ((1.0, 11), (2.0, 21)):
+        rod = Rod(length, nodes, (3.2,) * 3, (32,) * 3, "peskin4", 0.01, b)
+        found[length] = measure(rod)
+        assert found[length].perp == measure(replace(rod, radius=0.0)).perp
+    assert measure(replace(rod, radius=0.0)).spin == 0
+    per_length = found[2.0].spin * 2.0 - found[1.0].spin
+    assert np.sqrt(per_length / (4 * np.pi)) == pytest.approx(b, rel=0.01)
+    ends = (found[1.0].spin - per_length) / per_length
+    assert 2 * b < ends < 4 * b
+    thin = measure(replace(rod, radius=0.2 * b))
+    assert thin.spin == pytest.approx(4 * np.pi * (0.2 * b) ** 2, rel=0.02)
+    assert thin.spin_scatter < 1e-3
+
+
+def test_a_case_in_rft_takes_its_spin_from_the_grid_where_rotation_is_grid():
+    rod = {"length": 1.0, "nodes": 11, "bending": 1.0, "twisting": 1.0, "stretching": 400.0, "radius": 0.1}
+    fluid = {"model": "rft", "drag": {"matched": 0.5}, "box": [1.6] * 3, "cells": [16] * 3}
+    spins = {}
+    for rotation in ("local", "grid"):
+        case = scene({"rod": rod}, {**fluid, "rotation": rotation}, viscosity=2.0)
+        filament = case.filaments["rod"]
+        spins[rotation] = float(assemble.drag_coefficients(case, filament, np.full(11, 0.1))[2][0])
+        assert ("fluid.rotation" in idle_keys(case)) == (rotation == "local")
+    matched_rod = Rod(0.5, 6, (1.6,) * 3, (16,) * 3, "peskin4", 0.01, 0.1)
+    assert spins["local"] == pytest.approx(8 * np.pi * 0.01)
+    assert spins["grid"] == pytest.approx(2 * measure(matched_rod).spin)
+    assert spins["grid"] > 1.05 * spins["local"]  # its ends
