@@ -12,12 +12,13 @@ from ibfil.advection import filters
 from ibfil.errors import RunFailed
 from ibfil.fields import GridFields
 from ibfil.fluid import Held
-from ibfil.grid import Grid
-from ibfil.immersed import Immersed
+from ibfil.grid import Grid, interpolate
+from ibfil.immersed import Immersed, Nodes
 from ibfil.inertial_fields import InertialFields
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import FIELDS, Background, NavierStokes, Room
 from ibfil.simulation import Simulation
+from ibfil.stirring import StirredSolve, Stirring
 from ibfil.stokes import StokesByTable
 from ibfil.transforms import VectorTransform
 
@@ -419,3 +420,40 @@ def test_hardly_any_inertia_is_stokes_flow_on_the_papers_grid():
         for fluid in (STOKES, inertial(1e-4))
     ]
     assert rms(ends[1].shape.r - ends[0].shape.r) < 3e-5
+
+
+# --- rods that stir it (rotation = "grid") ---------------------------------------------------------------------------
+
+
+def stirred() -> tuple[NavierStokes, Nodes]:
+    """A fluid with one node that stirs it, and the node."""
+    grid, axis = Grid([2 * np.pi] * 3, [16] * 3), np.array([[0.6, 0.0, 0.8]])
+    made = Immersed(grid, KERNELS["peskin4"], 0.3, np.zeros(1), None, coupling=Stirring(np.zeros(1), np.ones(1)))
+    room = Room(VectorTransform((16, 16, 16), fields=FIELDS), VectorTransform((16, 16, 16)), grid)
+    return NavierStokes(made, 2.0, lambda alpha: StokesByTable(made, alpha), room), made.nodes(FAR, axis)
+
+
+def test_a_node_turns_with_half_the_vorticity_of_the_past():
+    it, nodes = stirred()
+    begin(it, waves(it))
+    spin = it.response(FAR, nodes.axes, 0.0, 1e-9).flow[0, 3]  # nothing changes in so short a step
+    k = np.stack(
+        np.broadcast_arrays(
+            *(a.reshape(s) for a, s in zip(it.fluid.grid.wave_numbers()[0], [(-1, 1, 1), (-1, 1), (-1,)], strict=True))
+        )
+    )
+    curl = (
+        np.fft.irfftn(1j * np.cross(k, it.past.now.view(complex), axis=0), it.fluid.grid.cells, axes=(1, 2, 3)) * 16**3
+    )
+    expected = 0.5 * interpolate(nodes.base, nodes.weights, curl)[0] @ nodes.axes[0]
+    assert abs(expected) > 0.01
+    assert spin == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_torque_on_fluid_at_rest_leaves_the_flow_that_the_stirred_solve_has():
+    it, nodes = stirred()
+    tau, push = 0.2, np.array([[0.3, -0.1, 0.2, 0.7]])
+    it.advance(it.response(FAR, nodes.axes, 0.0, tau), push)
+    solve = StirredSolve(it.fluid.grid, 0.3, alpha=2.0 / tau)
+    expected = solve.velocity(nodes.base, nodes.weights, it.fluid.coupling.lift(nodes.axes, push))[0, :3]
+    assert it.velocity_at(FAR, FAR, nodes.axes, push, tau)[0] == pytest.approx(expected, rel=1e-10)
