@@ -18,6 +18,7 @@ from ibfil.inertial_fields import InertialFields
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import FIELDS, Background, NavierStokes, Room
 from ibfil.simulation import Simulation
+from ibfil.stepping import NotConverged
 from ibfil.stirring import StirredSolve, Stirring
 from ibfil.stokes import StokesByTable
 from ibfil.transforms import VectorTransform
@@ -457,3 +458,44 @@ def test_a_torque_on_fluid_at_rest_leaves_the_flow_that_the_stirred_solve_has():
     solve = StirredSolve(it.fluid.grid, 0.3, alpha=2.0 / tau)
     expected = solve.velocity(nodes.base, nodes.weights, it.fluid.coupling.lift(nodes.axes, push))[0, :3]
     assert it.velocity_at(FAR, FAR, nodes.axes, push, tau)[0] == pytest.approx(expected, rel=1e-10)
+
+
+# --- steps that are tried again --------------------------------------------------------------------------------------
+
+
+def test_a_step_that_fails_and_is_halved_leaves_no_trace_in_the_past(monkeypatch):
+    """The same steps, taken without a failure, come to the same."""
+    case = swimmer(inertial(10.0), rod={"nodes": 15}, end=0.1, step=0.01)
+    one, two = Simulation(case), Simulation(case)
+    scheme, tried, fail = one._stepper, [], (1, 5, 6)
+
+    class Failing:
+        order = 2
+
+        def step(self, rods, fluid, state, dt):
+            tried.append(dt)
+            step = scheme.step(rods, fluid, state, dt)
+            if len(tried) in fail:
+                raise NotConverged("so the test has it", 0)
+            return step
+
+    monkeypatch.setattr(one, "_stepper", Failing())
+    one.advance(0.1, lambda: None)
+    assert one.shortened == len(fail)
+    good = [dt for k, dt in enumerate(tried, 1) if k not in fail]
+    assert len(set(np.round(good, 9))) > 2
+    for dt in good:
+        two.accept(two.attempt(dt), two.time + dt)
+    assert two.shape.r == pytest.approx(one.shape.r, abs=1e-14)
+    assert two.fluid.past.now == pytest.approx(one.fluid.past.now, abs=1e-14)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("density", [1.0, 50.0])
+def test_the_error_keeps_within_the_tolerance(density):
+    """A unit time; the swimmer forgets some of it on the way."""
+    settings = {"rod": {"nodes": 15}, "stretching": 300.0, "end": 0.6}
+    reference = run(swimmer(inertial(density), step=0.6 / 600, **settings)).shape.r
+    for tolerance in (0.1, 0.01):
+        simulation = run(swimmer(inertial(density), tolerance=tolerance, **settings))
+        assert tolerance / 50 < rms(simulation.shape.r - reference) / 0.6 < tolerance
+        assert simulation.steps < 60
