@@ -165,8 +165,10 @@ class TwoWell:
 
         V(e) = 16 b [(e - w1)(e - w2)]^2/(w2 - w1)^4,   e = O3 - tau0,   M3 = dV/de
 
-    Bistable filaments: Goldstein, Goriely, Huber & Wolgemuth, Phys. Rev. Lett. 84, 1631 (2000); Coombs, Huber, Kessler
-    & Goldstein, Phys. Rev. Lett. 89, 118102 (2002). The cost of a change along s is `DomainWalls`.
+    A double well in the twist, between helices of opposite hand, after Goldstein, Goriely, Huber & Wolgemuth, "Bistable
+    helices", Phys. Rev. Lett. 84, 1631 (2000), and Coombs, Huber, Kessler & Goldstein, "Periodic chirality
+    transformations propagating on bacterial flagella", Phys. Rev. Lett. 89, 118102 (2002). That it is the quartic of
+    wells and barrier above is this package's choice. The cost of a change along s is `DomainWalls`.
     """
 
     beside = None
