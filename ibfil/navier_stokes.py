@@ -106,7 +106,8 @@ class NavierStokes:
         self._make, self.room, self._background = operator, room, background
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: _Asked | None = None
-        self.fastest, self.time = 0.0, 0.0
+        self.time = 0.0
+        self.fastest = 0.0 if background is None else float(np.abs(background.at(0.0)[:3]).max())
         self._waves, _ = fluid.grid.wave_numbers()
 
     def _operator(self, alpha: float) -> tuple[float, Tabulated]:

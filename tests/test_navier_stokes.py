@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -499,3 +500,25 @@ def test_the_error_keeps_within_the_tolerance(density):
         simulation = run(swimmer(inertial(density), tolerance=tolerance, **settings))
         assert tolerance / 50 < rms(simulation.shape.r - reference) / 0.6 < tolerance
         assert simulation.steps < 60
+
+
+# --- steps and the speed of the fluid --------------------------------------------------------------------------------
+
+
+def test_automatic_steps_let_no_fluid_cross_more_than_a_cell():
+    """A stream of 10 past a swimmer, whose own motion asks for 25 steps a period: cells of 1/16, so steps of 1/160."""
+    settings = {"rod": {"nodes": 11}, "stretching": 300.0, "end": 2 * np.pi / 10}
+    stream = inertial(1.0, flow=["10", "0", "0"])
+    assert run(swimmer(inertial(1.0), **settings)).steps in (25, 26)
+    for more in ({}, {"tolerance": 0.5}):
+        simulation, ends = Simulation(swimmer(stream, **settings, **more)), [0.0]
+        simulation.advance(settings["end"], lambda s=simulation, ends=ends: ends.append(s.time))
+        assert 1 / 250 < max(np.diff(ends)) < 1.0001 / 160
+
+
+def test_given_steps_in_which_the_fluid_goes_too_far_are_told_once():
+    stream = inertial(1.0, flow=["10", "0", "0"])
+    simulation = run(swimmer(stream, rod={"nodes": 11}, stretching=300.0, end=0.05, step=0.0125))
+    assert simulation.steps == 4
+    (told,) = simulation.notices
+    assert re.search(r"at t = 0\.0125 the fluid crosses 2\.[0-4] cells in a step.*take a step below 0\.00", told)
