@@ -11,6 +11,7 @@ from fractions import Fraction
 from itertools import pairwise
 
 from .case_checks_filament import check_filament
+from .case_checks_size import check_size
 from .case_faults import Fault, shown
 from .case_schema import Coefficients, Fluid, Matched, Observe, Scene
 from .expressions import ExpressionError, suggestion
@@ -32,6 +33,7 @@ def check(case: Scene) -> Iterator[Fault]:
     for name, filament in case.filaments.items():
         yield from check_filament(name, filament, case)
     for part in (
+        check_size,
         _one_force,
         _contact,
         _fluid,

@@ -47,8 +47,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (Interrupted, KeyboardInterrupt) as error:
         return _say(str(error).splitlines() or ["interrupted"], CUT)
     except OSError as error:
+        faults = [] if error.errno is not None else _damages(arguments)  # HDF5 gives no number
+        if faults:
+            return _say(faults, BAD_INPUT)
         where = f"{error.filename}: " if error.filename else ""
         return _say([f"{where}{error.strerror or error}"], FAILED if error.errno in NO_ROOM else BAD_INPUT)
+    except Exception:
+        faults = _damages(arguments)
+        if not faults:
+            raise
+        return _say(faults, BAD_INPUT)
+
+
+def _damages(arguments: argparse.Namespace) -> list[str]:
+    """What is wrong with the run file a command has read; where nothing is, an error is the program's own fault."""
+    path = getattr(arguments, "run", None) or getattr(arguments, "resume", None)
+    if path is None:
+        return []
+    from .examine import examine
+
+    return examine(Path(path))
 
 
 def _say(faults: Sequence[str], status: int) -> int:

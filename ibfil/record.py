@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -111,8 +111,8 @@ class RunFile:
             self._rows = self._whole_outputs()
         except BaseException as error:
             self._file.close()
-            if isinstance(error, (OSError, KeyError, RuntimeError, ValueError)):
-                raise RunFileError(_damaged(self.path)) from error
+            if isinstance(error, Exception) and not isinstance(error, CaseError):  # HDF5 on bytes it did not write
+                raise RunFileError(damaged(self.path)) from error
             raise
 
     def _whole_outputs(self) -> int:
@@ -270,6 +270,10 @@ class RunFile:
         """Return what a dataset is, in words."""
         return str(self._file[path].attrs["description"])
 
+    def visit(self, look: Callable[[str, h5py.Dataset | h5py.Group], None]) -> None:
+        """Shows every group and dataset of the file."""
+        self._file.visititems(look)
+
     def frame(self, i: int) -> Frame:
         """Output ``i`` as the simulation gave it (without fields)."""
         return next(self.frames(i % self._rows))
@@ -311,7 +315,7 @@ def _open(path: Path) -> h5py.File:
     with open(path, "rb") as file:
         if file.read(8) != b"\x89HDF\r\n\x1a\n" and not checkpoint_path(path).exists():
             raise RunFileError(f"{path}: is not a run file of ibfil")
-    raise RunFileError(_damaged(path))
+    raise RunFileError(damaged(path))
 
 
 def _open_unlocked(path: Path) -> h5py.File:
@@ -339,7 +343,8 @@ def other_format(version: int, written_by: str) -> str:
     return f"has format {version}, written by ibfil {written_by}; this ibfil reads format {FORMAT_VERSION}: {cure}"
 
 
-def _damaged(path: Path) -> str:
+def damaged(path: Path) -> str:
+    """What is said of a file that cannot be read."""
     line = f"{path}: is damaged or cut short"
     if checkpoint_path(path).exists():
         line += f"; `ibfil run --resume {path}` rebuilds it"
