@@ -23,6 +23,7 @@ _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 _DRAWN = ("speed", "reaction at start", "reaction at finish", "power of the nodes", "dissipated by the fluid",
           "Lighthill efficiency", "frequency (angular)")  # fmt: skip
 _NEAR_ZERO = 1e-3  # of the largest component: a ratio of such numbers says nothing
+_NOISE = 1e-9  # of the largest number: what is left of a rod that rests
 
 
 def draw(made: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
@@ -114,12 +115,16 @@ def _numbers(axes: Axes, made: Comparison, looks: Looks) -> None:
     """Each number over that of the first fluid, with the scatter between periods."""
     columns = [column for column in made.columns if column.numbers]
     first = columns[0].numbers
-    names = [key for key in first if any(word in key for word in _DRAWN)]
-    largest = {word: max((abs(first[k].value) for k in names if word in k), default=0.0) for word in _DRAWN}
+    names = [key for key in first if key.startswith("observed: ") or any(word in key for word in _DRAWN)]
+    names = [
+        key for key in names if key.removeprefix("observed: ") == key or key.removeprefix("observed: ") not in names
+    ]
+    largest = max((abs(first[key].value) for key in names), default=0.0)
+    across = {word: max((abs(first[k].value) for k in names if word in k), default=0.0) for word in _DRAWN}
 
     def counts(key: str) -> bool:
-        word = next(word for word in _DRAWN if word in key)
-        return first[key].value != 0 and abs(first[key].value) > _NEAR_ZERO * largest[word]
+        of_kind = max((size for word, size in across.items() if word in key), default=0.0)
+        return abs(first[key].value) > max(_NEAR_ZERO * of_kind, _NOISE * largest)
 
     names = [key for key in names if counts(key)][:9]
     step = 0.6 / max(len(columns) - 1, 1)

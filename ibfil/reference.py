@@ -79,9 +79,9 @@ class Reference:
         return in_time.estimate + (in_space.estimate if self.nodes else 0.0)
 
     def of_nodes(self, measure: str) -> float:
-        """Return what the case's own nodes cost: how far they are from the finest, and what that has left."""
+        """Return how far the case's own nodes are from the finest tried; and what those have left, if that is known."""
         in_space = self.proofs[measure][1]
-        return sum(in_space.distances) + in_space.estimate
+        return sum(in_space.distances) + (in_space.estimate if in_space.holds else 0.0)
 
 
 def distances(a: RunFile, b: RunFile) -> dict[str, float]:

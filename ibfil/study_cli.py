@@ -32,6 +32,12 @@ def add_studies(add: Callable[..., argparse.ArgumentParser]) -> None:
     trade.add_argument("--vary", action="append", required=True, metavar="KEY=V1,V2,...", help=VARY)
     trade.add_argument("--observe", metavar="NAME,...", help="errors of what: position, observables (default: all)")
     trade.add_argument("--repeat", type=_count, default=3, metavar="N", help="runs of each setting, for the noise")
+    trade.add_argument(
+        "--clock",
+        choices=("wall", "processor"),
+        default="wall",
+        help="whose seconds count; on a busy machine: processor",
+    )
     trade.add_argument("--budget", type=_duration, metavar="10m", help="stop after this time: 90s, 10m, 2h")
     trade.add_argument("--for", dest="wanted", type=_error, metavar="1e-3", help="end with the cheapest for this error")
     compare = add("compare", _compare, "one scene under several fluids: table, CSV and a figure")
@@ -153,6 +159,7 @@ def _trade(arguments: argparse.Namespace) -> int:
         changes,
         observe=arguments.observe.split(",") if arguments.observe else (),
         repeat=arguments.repeat,
+        clock=arguments.clock,
         budget=arguments.budget,
         jobs=arguments.jobs,
         say=_say,

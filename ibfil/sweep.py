@@ -10,9 +10,9 @@ from typing import Any
 
 from .errors import CaseError
 from .members import Outcome, run_members, work
-from .study import Axis, Setting, combinations, numbers, study_members, write_csv
+from .study import Axis, Setting, combinations, measured, numbers, study_members, write_csv, write_json
 
-TABLE = "sweep.csv"
+TABLE, TOLD = "sweep.csv", "sweep.json"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def sweep(
     executor: Executor | None = None,
     say: Callable[[str], object] = print,
 ) -> list[Swept]:
-    """Run every combination that is not done yet, and write ``folder``/sweep.csv.
+    """Run every combination that is not done yet, and write ``folder``/sweep.csv and .json (with versions, machine).
 
     ``case`` is a file, a shipped name or a text, ``overrides`` hold for all. Raises CaseError where the case or
     all combinations are at fault, and Interrupted as `run_members`.
@@ -54,7 +54,9 @@ def sweep(
     settings = combinations(axes)
     outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, say=say)
     rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
-    write_csv(Path(folder) / TABLE, [row.row() for row in rows])
+    table = [row.row() for row in rows]
+    write_csv(Path(folder) / TABLE, table)
+    write_json(Path(folder) / TOLD, {**measured(), "overrides": list(overrides), "runs": table})
     return rows
 
 

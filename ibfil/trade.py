@@ -2,8 +2,10 @@
 
 Every setting is run several times, in rounds, and held against a reference that has proved itself (reference.py). Its
 cost is seconds a unit of simulated time, without compilation, start-up and first step: the least of its runs, their
-range the noise. Its errors are those of the measures: `position`, the root mean square distance of nodes in units of
-L, and observables, relative. A setting is on the Pareto front of a measure where no other is both cheaper and better.
+range the noise. Seconds are those of the clock on the wall, or of the processor: the same on a machine that is idle
+(a run has one thread), and on a busy one the only ones that mean something. Its errors are those of the measures:
+`position`, the root mean square distance of nodes in units of L, and observables, relative. A setting is on the Pareto
+front of a measure where no other is both cheaper and better.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from .case import Case
 
 TABLE, TOLD, FIGURE = "trade.csv", "trade.json", "trade.png"
+CLOCKS = ("wall", "processor")
 _SPACE = ("nodes", "spacing")  # keys that change the nodes
 
 Say = Callable[[str], object]
@@ -40,7 +43,7 @@ class Tried:
     message: str
     errors: Mapping[str, float]
     seconds: tuple[float, ...]
-    processor: tuple[float, ...]  # the same of processor time
+    processor: tuple[float, ...]  # the same of processor time, whichever clock `seconds` are of
 
     @property
     def cost(self) -> float:
@@ -81,6 +84,7 @@ def trade(
     *,
     observe: Sequence[str] = (),
     repeat: int = 3,
+    clock: str = "wall",
     budget: float | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
@@ -89,6 +93,7 @@ def trade(
     """Measure every combination of ``axes`` and write trade.csv, trade.json and trade.png into ``folder``.
 
     ``observe`` names the measures: `position` or an observable of the case; by default position and all of them.
+    ``clock`` is wall or processor.
     ``budget`` in seconds: what is not measured by then is left out, and the same call goes on. Raises CaseError;
     RunFailed where the reference fails or is proved in no measure; Interrupted, also where the budget ends before
     the reference is there.
@@ -106,9 +111,9 @@ def trade(
         reference = prove(case, overrides, folder, asked, nodes, run)
         measures = _proved(reference, asked, say)
         _rounds(members, folder / "runs", repeat, run, left, say)
-    tried = tuple(_tried(one, folder / "runs", repeat, reference, measures) for one in settings)
+    tried = tuple(_tried(one, folder / "runs", repeat, clock, reference, measures) for one in settings)
     fronts = {name: front([one.cost for one in tried], [one.errors.get(name) for one in tried]) for name in measures}
-    about = {**measured(), "repeats": repeat, "jobs": jobs}
+    about = {**measured(), "repeats": repeat, "jobs": jobs, "clock": clock}
     made = Trade(base.title, reference, measures, tried, fronts, about)
     _write(made, folder)
     return made
@@ -190,7 +195,9 @@ def _rounds(
 # --- reading what was run -------------------------------------------------------------------------
 
 
-def _tried(setting: Setting, where: Path, repeat: int, reference: Reference, measures: Sequence[str]) -> Tried:
+def _tried(
+    setting: Setting, where: Path, repeat: int, clock: str, reference: Reference, measures: Sequence[str]
+) -> Tried:
     """What the repeats of a setting show."""
     from .record import RunFile
 
@@ -207,7 +214,7 @@ def _tried(setting: Setting, where: Path, repeat: int, reference: Reference, mea
             status, message = run.status, run.reason
             spent = run.pace
             if spent[2] > 0:
-                seconds.append(spent[0] / spent[2])
+                seconds.append(spent[CLOCKS.index(clock)] / spent[2])
                 processor.append(spent[1] / spent[2])
             if not errors and status != "failed":
                 with RunFile(reference.path) as best:

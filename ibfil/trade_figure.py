@@ -33,15 +33,34 @@ def draw(made: Trade, path: Path) -> None:
         groups, along = group(made)
         for axes, measure in zip(panels, measures, strict=True):
             _panel(axes, made, measure, groups, along)
-        fig.legend(
-            *panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=2 * len(measures), fontsize=7.5
-        )
         title = textwrap.fill(made.title or "error against wall time", 34 * len(measures) + 20)
         fig.suptitle(title, x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         about = f"{made.about['date']}, ibfil {made.about['versions']['ibfil']}, {made.about['machine']}"
-        note = f"bars: range of {made.about['repeats']} runs, point: the fastest. {about}"
-        fig.supxlabel(textwrap.fill(note, 68 * len(measures)), fontsize=6.5, color="0.35", x=0.012, ha="left")
+        bars = (
+            f"bars: range of {made.about['repeats']} runs, point: the fastest; hollow: under the reference's own error"
+        )
+        _few_ticks(panels[0])
+        fig.legend(
+            *panels[0].get_legend_handles_labels(),
+            loc="outside lower left",
+            ncols=2 * len(measures),
+            fontsize=7.5,
+            title=f"{bars}\n{about}",
+            title_fontsize=7,
+            alignment="left",
+        )
         fig.savefig(path, dpi=170)
+
+
+def _few_ticks(axes: Axes) -> None:
+    """On an axis of little more than a decade: 1, 2, 5 with plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axes.get_xlim()
+    if high < 50 * low:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, place: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def group(made: Trade) -> tuple[dict[str, list[int]], str]:
@@ -84,7 +103,7 @@ def _panel(axes: Axes, made: Trade, measure: str, groups: dict[str, list[int]], 
     if not made.reference.nodes:
         own = made.reference.of_nodes(measure)
         high = max(high, 2 * own)
-        axes.axhline(own, color="0.45", ls=(0, (5, 3)), lw=1, label="error of the case's own nodes, not varied here")
+        axes.axhline(own, color="0.45", ls=(0, (5, 3)), lw=1, label="the case's own nodes against the finest tried")
     front = [made.tried[i] for i in made.fronts[measure]]
     axes.step(
         [one.cost for one in front],
@@ -100,7 +119,8 @@ def _panel(axes: Axes, made: Trade, measure: str, groups: dict[str, list[int]], 
     for number, (name, members) in enumerate(groups.items()):
         _line(axes, [made.tried[i] for i in members], made, measure, name, along, number, high)
     axes.set_ylim(low, high * 1.6)
-    axes.set_xlabel("seconds a unit of simulated time")
+    clock = {"wall": "seconds", "processor": "processor seconds"}[made.about["clock"]]
+    axes.set_xlabel(f"{clock} a unit of simulated time")
     words = "position: rms over nodes / L" if measure == "position" else f"{measure}: relative error"
     axes.set_ylabel(words)
     axes.grid(True, which="major", color="0.92", lw=0.6)
@@ -118,25 +138,15 @@ def _line(
     y = np.array([max(one.errors[measure], 1e-300) for one in done])
     spread = np.array([[0.0, max(one.seconds, default=0.0) - one.cost] for one in done]).reshape(-1, 2).T
     axes.errorbar(x, y, xerr=spread, color=colour, lw=1.2, elinewidth=0.8, capsize=2, zorder=2)
-    axes.plot([], [], mark + "-", color=colour, ms=5.5, lw=1.2, label=name)
+    if done:
+        axes.plot([], [], mark + "-", color=colour, ms=5.5, lw=1.2, label=name)
     for one, cost, error in zip(done, x, y, strict=True):
         face = "white" if made.uncertain(one, measure) else colour
         axes.plot(cost, error, mark, color=colour, mfc=face, ms=5.5, zorder=3)
-    if along and done:
-        for one, cost, error, side in ((done[0], x[0], y[0], -1), (done[-1], x[-1], y[-1], 1)):
-            words = f"{_tail(along)} {one.setting.values[along]}"
-            high = "bottom" if side > 0 else "top"
-            place = (0, 7 * side)
-            axes.annotate(
-                words,
-                (cost, error),
-                place,
-                textcoords="offset points",
-                fontsize=6.5,
-                color=colour,
-                ha="center",
-                va=high,
-            )
+    ends = [0, -1] if along and done else []
+    for i in ends:
+        words = f"{_tail(along)} {float(done[i].setting.values[along]):.3g}"
+        axes.annotate(words, (x[i], y[i]), (6, 3), textcoords="offset points", fontsize=6, color=colour)
     lost = [one for one in tried if one.status == "failed"]
     for one in lost:
         # Where a run fails at its first step it has no pace: at the left edge then.

@@ -81,6 +81,29 @@ def test_running_knows_the_screen_only_through_print():
         assert not imports(name) & LOOKING, name
 
 
+STUDIES = {
+    "members",
+    "workers",
+    "study",
+    "study_cli",
+    "sweep",
+    "compare",
+    "quantities",
+    "trade",
+    "reference",
+    "stability",
+}
+
+
+def test_a_run_knows_nothing_of_studies_and_a_worker_loads_little():
+    """What a process of a study loads first is the standard library: it has yet to set its number of threads."""
+    for name in set(MODULES) - STUDIES - LOOKING - {"__init__", *(n for n in MODULES if n.endswith("figure"))}:
+        assert not imports(name) & STUDIES, name
+    for name in ("members", "workers", "threads", "errors", "study_cli"):
+        outside = imports(name, at_load=True) - set(MODULES)
+        assert outside <= set(sys.stdlib_module_names), name
+
+
 RUN = """
 [filament.rod]
 length = 1.0

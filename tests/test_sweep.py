@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 
 import pytest
@@ -81,6 +82,9 @@ def test_a_sweep_makes_a_table_of_all_observables_and_tells_what_failed(here, ca
             assert run.case.time.end == 0.01
             assert float(row["span"]) == float(run.observables["span"][-1])
     assert rows[0]["span"] != rows[2]["span"]
+    told = json.loads((here / "bent-sweep/sweep.json").read_text())
+    assert told["machine"]
+    assert [one["status"] for one in told["runs"]] == [row["status"] for row in rows]
 
 
 def test_as_a_job_array_each_index_is_one_run_and_the_table_comes_after(here, capsys):

@@ -119,8 +119,12 @@ def test_a_trade_has_a_table_a_figure_and_ends_with_the_cheapest(here, capsys):
     errors = [float(rows[step, "implicit"]["position"]) for step in ("5e-3", "1e-3")]
     assert errors[0] / errors[1] == pytest.approx(5, rel=0.25)  # of first order
     with RunFile("out/runs/step=1e-3,scheme=implicit,order=1.2.h5") as run:
-        seconds, _, covered = run.pace
+        seconds, processor, covered = run.pace
     assert float(rows["1e-3", "implicit"]["seconds_most"]) >= seconds / covered
+    assert cli.main([*command, "--clock", "processor"]) == 0  # nothing is run again
+    with open("out/trade.csv", newline="") as file:
+        by_processor = next(row for row in csv.DictReader(file) if row["time.step"] == "1e-3")
+    assert float(by_processor["seconds"]) == float(by_processor["processor"]) <= processor / covered
     told = json.loads((here / "out/trade.json").read_text())
     assert told["machine"]
     assert told["versions"]["ibfil"]
