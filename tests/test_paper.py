@@ -93,7 +93,7 @@ def test_the_printed_scheme_tears_the_rod_beyond_its_limit_and_not_below():
 
 
 def test_the_swimmer_by_finite_differences_turns_and_in_water_goes_the_wrong_way():
-    """A swimmer with whole waves turns by 0.5 degrees in this time, and moves to -x."""
+    """By finite volumes it rocks by 1.5 degrees in this time and comes back, and moves to -x."""
     times, shapes = finite_difference.swim(Swimmer(128), 1e-4, 0.1, 0.05)
     chord = shapes[-1, -1] - shapes[-1, 0]
     assert times[-1] == pytest.approx(0.1)

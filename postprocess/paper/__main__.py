@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import importlib
+import os
 import platform
 import sys
 from datetime import date
@@ -14,7 +15,6 @@ import matplotlib
 
 from ibfil.errors import CaseError, Interrupted
 from ibfil.members import Member, run_members
-from ibfil.record import RunFile
 from ibfil.recorder import versions
 
 from .drawing import STYLE
@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _paper(parts: list[str], quick: bool, jobs: int, folder: Path) -> int:
     rows: list[Row] = []
-    failed = 0
+    failed, seconds = 0, 0.0
     for part in parts:
         module = importlib.import_module(f".{PARTS[part]}", __package__)
         members: list[Member] = module.members(quick)
@@ -64,6 +64,7 @@ def _paper(parts: list[str], quick: bool, jobs: int, folder: Path) -> int:
                 figure, found = module.draw(runs, quick)
                 figure.savefig(folder / f"{PARTS[part]}.png", dpi=130)
             rows += found
+            seconds += runs.seconds()
             print(plain(found), end="\n\n")
         except (KeyError, CaseError) as missing:  # a run there is no file of: told above, and why
             failed += 1
@@ -71,27 +72,23 @@ def _paper(parts: list[str], quick: bool, jobs: int, folder: Path) -> int:
         finally:
             runs.close()
     print(plain(rows))
-    _write(rows, quick, folder)
+    _write(rows, seconds, quick, folder)
     return 1 if failed else 0
 
 
-def _write(rows: list[Row], quick: bool, folder: Path) -> None:
+def _write(rows: list[Row], seconds: float, quick: bool, folder: Path) -> None:
     """The table as CSV and Markdown, with where it comes from."""
     with (folder / "table.csv").open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(HEADINGS)
         writer.writerows(columns(row) for row in rows)
     told = ", ".join(f"{name} {version}" for name, version in versions().items())
-    machine = f"{platform.system()} {platform.machine()}, one thread a run"
+    load = f"load average {os.getloadavg()[2]:.0f} on {os.cpu_count()} cores" if hasattr(os, "getloadavg") else ""
+    machine = f"{platform.system()} {platform.machine()}, one thread a run, {load}"
     head = f"# Section 7 of the paper, {'quick' if quick else 'full'} form\n\n{date.today()}; {told}; {machine}.\n\n"
-    seconds = sum(file.wall_time for file in _files(folder))
-    tail = f"\nWall time of all runs in the folder: {seconds / 60:.0f} minutes.\n"
+    tail = f"\nWall time of all runs: {seconds / 60:.0f} minutes.\n"
     (folder / "table.md").write_text(head + markdown(rows) + tail, encoding="utf-8")
     print(f"\n{folder / 'table.md'}, {folder / 'table.csv'}")
-
-
-def _files(folder: Path) -> list[RunFile]:
-    return [RunFile(path) for path in sorted(folder.glob("*.h5")) if not path.name.endswith(".ckpt.h5")]
 
 
 if __name__ == "__main__":

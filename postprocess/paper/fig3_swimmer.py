@@ -70,12 +70,18 @@ def _mean(r: np.ndarray) -> np.ndarray:
     return (0.5 * (r[:, 1:] + r[:, :-1])).mean(axis=1)
 
 
+def _angle(r: np.ndarray) -> np.ndarray:
+    """Angle of the line from end to end with x (T,), degrees."""
+    chord = r[:, -1] - r[:, 0]
+    return np.degrees(np.unwrap(np.arctan2(chord[:, 1], chord[:, 0])))
+
+
 def _rows(runs: Runs, eta: str) -> list[Row]:
     run = runs[f"fig3-eta={eta}"]
     ends = np.searchsorted(run.time, [PERIOD - 1e-9, 3 * PERIOD - 1e-9])
     moved = (_centroid(run)[ends[1]] - _centroid(run)[ends[0]]) / (2 * PERIOD)
-    chord = run.position()[ends][:, -1] - run.position()[ends][:, 0]
-    turned = np.degrees(np.diff(np.arctan2(chord[:, 1], chord[:, 0])))[0] / 2
+    angle = _angle(run.position())
+    turned = float(angle[ends[1]] - angle[ends[0]]) / 2
     known = 0.1035 if eta == "1" else 0.1034
     seconds = run.wall_time
     return [
@@ -91,6 +97,7 @@ def _rows(runs: Runs, eta: str) -> list[Row]:
         ),
         Row("7.1", f"drift along y, eta = {eta}", "", -0.0047, float(moved[1]), seconds, 0.05),
         Row("7.1", f"turning, degrees a period, eta = {eta}", "none", None, f"{turned:.4f}", seconds),
+        Row("7.1", f"rocking to and fro, largest angle in degrees, eta = {eta}", "", None, float(angle.max()), seconds),
     ]
 
 
@@ -109,8 +116,7 @@ def _differences(
 
 def _difference_rows(eta: str, times: np.ndarray, shapes: np.ndarray, seconds: float) -> list[Row]:
     way = _mean(shapes)[:, 0]
-    chord = shapes[:, -1] - shapes[:, 0]
-    turned = np.degrees(np.unwrap(np.arctan2(chord[:, 1], chord[:, 0])))
+    turned = _angle(shapes)
     speed = float(way[-1] / times[-1])
     return [
         Row(

@@ -33,7 +33,7 @@ SPINS = (0.985, 0.995, 1.005, 1.015)  # about the rounded values below, which th
 ABOUT = {(1.0, 0.1): 8.9, (0.5, 0.1): 8.9, (0.05, 0.1): 9.2, (0.05, 0.05): 8.9, (0.05, 0.02): 8.9}
 CLAMP = "/(4*pi*eta*a**2)"
 UP, DOWN = "8.6 + 0.005*t", "where(t < 60, 10, 9.4 - 0.005*max(t - 80, 0))"
-RIBBON_UP, RIBBON_DOWN = "9 + 0.01*t", "10.5 - 0.01*max(t - 60, 0)"
+RIBBON_UP, RIBBON_DOWN = "9 + 0.02*t", "10.5 - 0.02*max(t - 60, 0)"
 
 
 def members(quick: bool) -> list[Member]:
@@ -57,13 +57,15 @@ def members(quick: bool) -> list[Member]:
         return found
     found.append(Member("fig8-large-round", "whirling"))
     found.append(Member("fig8-large-ribbon", "whirling_ribbon", ("time.end=600",)))
-    steady = ("stop.0.after=1e6", "filament.rod.nodes=65")
+    steady = ("stop.0.after=1e6", "filament.rod.nodes=49")
     for name, spin, end in (("up", UP, 200), ("down", DOWN, 320)):
         driven = f"filament.rod.start.spin=({spin}){CLAMP}"
-        found.append(Member(f"fig8-sweep-round-{name}", "whirling", (driven, f"time.end={end}", *steady)))
-    for name, spin, end in (("up", RIBBON_UP, 150), ("down", RIBBON_DOWN, 210)):
+        found.append(
+            Member(f"fig8-sweep-round-{name}", "whirling", (driven, f"time.end={end}", "time.step=0.01", *steady))
+        )
+    for name, spin, end in (("up", RIBBON_UP, 75), ("down", RIBBON_DOWN, 135)):
         driven = f"filament.rod.start.spin=({spin})*(1 + A2)/2{CLAMP}"
-        found.append(Member(f"fig8-sweep-ribbon-{name}", "whirling_ribbon", (driven, f"time.end={end}", steady[0])))
+        found.append(Member(f"fig8-sweep-ribbon-{name}", "whirling_ribbon", (driven, f"time.end={end}", *steady)))
     return found
 
 
@@ -192,7 +194,7 @@ def _sweep(run: RunFile, name: str, ribbon: bool = False) -> tuple[np.ndarray, n
     """Spin (in A+/(zeta_r L^2)) and amplitude of a sweep, its start left out."""
     t, amplitude = run.time, _amplitude(run)
     if ribbon:
-        spin, start = (9 + 0.01 * t, 0.0) if name == "up" else (10.5 - 0.01 * np.maximum(t - 60, 0), 60.0)
+        spin, start = (9 + 0.02 * t, 0.0) if name == "up" else (10.5 - 0.02 * np.maximum(t - 60, 0), 60.0)
     else:
         spin, start = (8.6 + 0.005 * t, 0.0) if name == "up" else (9.4 - 0.005 * np.maximum(t - 80, 0), 80.0)
     kept = t >= start
