@@ -31,19 +31,20 @@ FAMILIES = {
     "round": (),
     "round-soft": ("parameters.C=0.01",),
     "ribbon": ("parameters.thin=0.05",),
-    "ribbon-soft": ("parameters.thin=0.05", "parameters.C=0.01"),
+    "ribbon-soft": ("parameters.thin=0.05", "parameters.C=0.05"),
 }
 WORDS = {
     "round": "round, C = A",
     "round-soft": "round, C = A/50",
     "ribbon": "ribbon, C = A1",
-    "ribbon-soft": "ribbon, C = A1/50",
+    "ribbon-soft": "ribbon, C = A1/10",
 }
 # eta (pN s/um^2) and nodes: as many as waves of length 2 pi L sqrt(32/mu) ask for, no more than the kicks allow
 SPACE = ((0.02, 25), (0.05, 33), (0.1, 49), (0.2, 65), (0.5, 97), (1, 97))
 SPACE_ROUND = ((2, 97),)
 COILED = 0.8  # of the length: the tip-to-tip distance at which a coil's radius is measured
-FITTED = 4 * 153.2  # the slope is fitted where mu, by the weaker axis, is above this
+BUCKLED = 153.2  # mu, by the weaker axis, above which a rod buckles
+COIL = 32 * (4 * np.pi) ** 2  # above this the fastest wave, 2 pi L sqrt(32/mu), goes once into the window [L/4, 3L/4]
 
 
 def members(quick: bool) -> list[Member]:
@@ -103,18 +104,17 @@ def _onset(runs: Runs) -> list[Row]:
 
 
 def _planar(runs: Runs) -> tuple[list[tuple[float, float, int]], list[Row]]:
-    """Lambda, shortest tip-to-tip distance over L and bending mode of each run in the plane; what they come to."""
+    """Lambda, shortest tip-to-tip distance over L, bending mode (0: not bent) of each run; what they come to."""
     found = []
     for name in runs.named("fig7-plane-"):
         run = runs[name]
         given, tips = run.case.parameters, np.asarray(run.observables["shortest"])
-        found.append(
-            (given["Lambda"], float(tips.min() / given["L"]), bending_mode(run, first_below(tips / given["L"], 0.9)))
-        )
+        mode = bending_mode(run, first_below(tips, 0.9 * given["L"])) if tips.min() < 0.9 * given["L"] else 0
+        found.append((given["Lambda"], float(tips.min() / given["L"]), mode))
     seconds = runs.seconds("fig7-plane-")
-    below = [tip for Lambda, tip, _ in found if Lambda < 0.393]
+    below = [tip for Lambda, tip, _ in found if Lambda < 0.3]
     above = sorted(found)
-    rows = [Row("7.5", "tip to tip below threshold, over L, at least", "", 1.0, min(below), seconds, 0.02)]
+    rows = [Row("7.5", "tip to tip over L, Lambda < 0.3, at least", 1.0, None, min(below), seconds)]
     for low, high in ((0.393, 1.99), (1.99, 4.96), (4.96, 99)):
         some = [(tip, which) for Lambda, tip, which in above if low < Lambda < high]
         modes = "/".join(str(sum(which == m for _, which in some)) for m in (1, 2, 3, 4))
@@ -122,7 +122,17 @@ def _planar(runs: Runs) -> tuple[list[tuple[float, float, int]], list[Row]]:
         title = (
             f"tip to tip over L, {low:g} < Lambda < {'' if high == 99 else format(high, 'g')}, median of {len(some)}"
         )
-        rows.append(Row("7.5", title, "falls", None, shortest, seconds, note=f"runs in bending modes 1/2/3/4: {modes}"))
+        rows.append(
+            Row(
+                "7.5",
+                title,
+                "falls",
+                None,
+                shortest,
+                seconds,
+                note=f"bent in modes 1/2/3/4: {modes}; the others turn away first",
+            )
+        )
     rows.append(_stopped(runs, "fig7-plane-", "in the plane", seconds))
     return found, rows
 
@@ -143,19 +153,28 @@ Points = dict[str, np.ndarray]  # family -> mu-bar by A1, radius over L when coi
 
 
 def _space(runs: Runs) -> tuple[Points, dict[str, tuple[float, float]]]:
-    """The radii of each family; slope and its standard error where mu is above FITTED."""
+    """The radii of each family; slope and its standard error where there is a whole turn to measure."""
     points, slopes = {}, {}
     for family in FAMILIES:
         found = [fold(runs[name], COILED) for name in runs.named(f"fig7-space-{family}-eta")]
-        points[family] = np.array([one for one in found if one is not None])
-        thin = 20.0 if family.startswith("ribbon") else 1.0
-        kept = points[family][points[family][:, 0] * thin > FITTED]
-        (slope, _), covariance = np.polyfit(np.log(kept[:, 0]), np.log(kept[:, 1]), 1, cov="unscaled")
-        left = np.log(kept[:, 1]) - np.polyval(
-            np.polyfit(np.log(kept[:, 0]), np.log(kept[:, 1]), 1), np.log(kept[:, 0])
-        )
-        slopes[family] = float(slope), float(np.sqrt(covariance[0, 0] * left @ left / max(len(kept) - 2, 1)))
+        points[family] = np.array([one for one in found if one is not None]).reshape(-1, 3)
+        slopes[family] = _slope(points[family], family, COIL)
     return points, slopes
+
+
+def _slope(points: np.ndarray, family: str, above: float, column: int = 1) -> tuple[float, float]:
+    """Of the logarithm of the radius in that of mu, where mu by the weaker axis is ``above``; and its standard error.
+
+    Not a number where there are too few points.
+    """
+    kept = points[points[:, 0] * (20.0 if family.startswith("ribbon") else 1.0) > above]
+    if len(np.unique(kept[:, 0])) < 2 or len(kept) < 3:
+        return float("nan"), float("nan")
+    x, y = np.log(kept[:, 0]), np.log(kept[:, column])
+    d = x - x.mean()
+    slope = float(d @ y / (d @ d))
+    left = y - y.mean() - slope * d
+    return slope, float(np.sqrt(left @ left / (len(x) - 2) / (d @ d)))
 
 
 def _space_rows(runs: Runs, points: Points, slopes: dict[str, tuple[float, float]]) -> list[Row]:
@@ -163,10 +182,13 @@ def _space_rows(runs: Runs, points: Points, slopes: dict[str, tuple[float, float
     for family, (slope, error) in slopes.items():
         start = f"fig7-space-{family}-eta"
         seconds, count = runs.seconds(start), len(points[family])
+        everything, largest = _slope(points[family], family, BUCKLED), _slope(points[family], family, COIL, 2)
         title = f"slope of log R_eff in log(eta gamma/Ap), {WORDS[family]}"
         note = (
-            f"{count} coils, radius when the ends are {COILED:g} L apart; ± one standard error of the fit: {error:.3f}"
+            f"± {error:.2f}; {count} coils, radius when the ends are {COILED:g} L apart, fitted where the window holds "
+            f"a whole turn (mu by the weaker axis > {COIL:.0f}); all above threshold: {everything[0]:.2f} ± "
+            f"{everything[1]:.2f}; largest radius until the ends are closest: {largest[0]:.2f} ± {largest[1]:.2f}"
         )
-        rows.append(Row("7.5", title, -0.25, None, slope, seconds, note=note))
+        rows.append(Row("7.5", title, -0.25, None, slope if np.isfinite(slope) else "too few", seconds, note=note))
         rows.append(_stopped(runs, start, WORDS[family], seconds))
     return rows

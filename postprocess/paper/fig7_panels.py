@@ -31,9 +31,9 @@ def montage(axes: Axes, runs: Runs) -> None:
         axes.text(2.2, -1.0 * k, f"γt = {gamma * run.time[i]:.2f}", va="center", fontsize=7.5)
     near = int(np.argmin(np.abs(outputs - shortest)))
     axes.text(-2.45, -1.0 * near, "*", fontsize=16, va="center")
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal")
     axes.set_yticks([])
-    axes.set_xlim(-2.7, 3.3)
+    axes.set_xlim(-2.7, 3.6)
     axes_labels(
         axes, "x (µm)", "", f"a  in the plane, Λ = {run.case.parameters['Lambda']:.2g}; *: the ends are closest"
     )
@@ -44,11 +44,11 @@ def planar(axes: Axes, found: list[tuple[float, float, int]], thresholds: list[f
     for k, Lambda in enumerate(thresholds):
         axes.axvline(Lambda, color="0.75", lw=0.8)
         axes.text(Lambda * 1.03, 1.06, f"mode {k + 1}: {Lambda:.3g}", fontsize=7.5, color="0.35")
-    for mode, marker in ((1, "o"), (2, "s"), (3, "D"), (4, "^")):
+    for mode, marker in ((0, "x"), (1, "o"), (2, "s"), (3, "D"), (4, "^")):
         some = np.array([(x, y) for x, y, which in found if which == mode])
         if len(some):
-            name = {1: "1 (C)", 2: "2 (S)", 3: "3 (W)", 4: "4"}[mode]
-            axes.plot(*some.T, marker, color=COLOURS[mode - 1], ms=4.5, mfc="none", label=name)
+            name = {0: "stays above 0.9 L", 1: "1 (C)", 2: "2 (S)", 3: "3 (W)", 4: "4"}[mode]
+            axes.plot(*some.T, marker, color=COLOURS[mode - 1] if mode else "0.6", ms=4.5, mfc="none", label=name)
     axes.set_xscale("log")
     axes.set_ylim(0, 1.12)
     axes.legend(title="bending mode at 0.9 L", title_fontsize=7.5, loc="lower left")
@@ -85,7 +85,7 @@ def space(axes: Axes, points: dict, slopes: dict, words: dict) -> None:
         if family.startswith("ribbon"):
             axes.plot(20 * found[:, 0], found[:, 1], "osD^"[k], color=COLOURS[k], ms=2, alpha=0.6)
     x = np.array([6e2, 2e5])
-    axes.plot(x, 0.05 * (x / 1e4) ** -0.25 * 0.8, "-", color="0.5", lw=0.9, label="slope -1/4")
+    axes.plot(x, 0.03 * (x / 1e4) ** -0.25, "-", color="0.5", lw=0.9, label="slope -1/4")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.legend(title="small symbols: ribbons by A2 = A1/20", title_fontsize=7.5)

@@ -173,9 +173,10 @@ def _states(runs: Runs) -> list[Row]:
     for name, told in (("round", "large, past the clamp"), ("ribbon", "finite")):
         run = runs[f"fig8-large-{name}"]
         tip, amplitude = run.position()[-1, -1], _amplitude(run)
-        steady = "steady to 1e-3" if run.status == "stopped" else "not steady yet"
-        late = run.time > run.time[-1] - 10
-        state = f"{amplitude[late].mean():.4f}"
+        late, before = (_last(run, amplitude, k) for k in (0, 1))
+        swing = 0.5 * np.ptp(late) / late.mean()
+        steady = f"mean over 5 units changes by {abs(late.mean() / before.mean() - 1):.1e}, swings by {swing:.1%}"
+        state = f"{late.mean():.4f}"
         where = f"tip's distance from the axis, {name}, spin {_spin(run):.3g}"
         behind = f"{steady} at t = {run.time[-1]:.4g}; the free end is at x = {tip[0]:.3f} L"
         rows.append(Row("7.6", where, told, None, state, run.wall_time, note=behind))
@@ -188,6 +189,12 @@ def _states(runs: Runs) -> list[Row]:
             note = "later than the threshold: it has to grow first" if name == "up" else "hysteresis"
             rows.append(Row("7.6", f"{words}, A/(zeta_r L^2)", "", None, jump, runs[whole].wall_time, note=note))
     return rows
+
+
+def _last(run: RunFile, values: np.ndarray, k: int) -> np.ndarray:
+    """The values of the last five units of time, or (k = 1) of the five before them."""
+    end = run.time[-1] - 5 * k
+    return values[(run.time > end - 5) & (run.time <= end)]
 
 
 def _sweep(run: RunFile, name: str, ribbon: bool = False) -> tuple[np.ndarray, np.ndarray]:
