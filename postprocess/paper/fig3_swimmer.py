@@ -97,7 +97,7 @@ def _rows(runs: Runs, eta: str) -> list[Row]:
         ),
         Row("7.1", f"drift along y, eta = {eta}", "", -0.0047, float(moved[1]), seconds, 0.05),
         Row("7.1", f"turning, degrees a period, eta = {eta}", "none", None, f"{turned:.4f}", seconds),
-        Row("7.1", f"rocking to and fro, largest angle in degrees, eta = {eta}", "", None, float(angle.max()), seconds),
+        Row("7.1", f"largest angle it rocks by, degrees, eta = {eta}", "", None, float(angle.max()), seconds),
     ]
 
 

@@ -119,9 +119,8 @@ def _planar(runs: Runs) -> tuple[list[tuple[float, float, int]], list[Row]]:
         some = [(tip, which) for Lambda, tip, which in above if low < Lambda < high]
         modes = "/".join(str(sum(which == m for _, which in some)) for m in (1, 2, 3, 4))
         shortest = f"{np.median([tip for tip, _ in some]):.3f}"
-        title = (
-            f"tip to tip over L, {low:g} < Lambda < {'' if high == 99 else format(high, 'g')}, median of {len(some)}"
-        )
+        window = f"Lambda > {low:g}" if high == 99 else f"{low:g} < Lambda < {high:g}"
+        title = f"tip to tip over L, {window}, median of {len(some)}"
         rows.append(
             Row(
                 "7.5",
