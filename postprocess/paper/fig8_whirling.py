@@ -188,6 +188,13 @@ def _states(runs: Runs) -> list[Row]:
             jump = float(spin[np.argmax(where)]) if where.any() else float("nan")
             note = "later than the threshold: it has to grow first" if name == "up" else "hysteresis"
             rows.append(Row("7.6", f"{words}, A/(zeta_r L^2)", "", None, jump, runs[whole].wall_time, note=note))
+    if "fig8-sweep-ribbon-down" in set(runs):
+        spin, amplitude = _sweep(runs["fig8-sweep-ribbon-down"], "down", ribbon=True)
+        title = "tip's distance from the axis, ribbon, spin lowered to 9.0"
+        note = "below the threshold 9.203"
+        held = float(amplitude[spin < 9.02].mean())
+        note += ": it stays bent, where the paper has an amplitude that goes with the distance from onset"
+        rows.append(Row("7.6", title, "small", None, held, runs["fig8-sweep-ribbon-down"].wall_time, note=note))
     return rows
 
 
@@ -216,7 +223,8 @@ def _draw_onsets(axes: Axes, runs: Runs) -> None:
             label = f"A2/A1 = {rod[0]:g}, a = {rod[1]:g} L: {_zero(points)[0]:.3f}"
             axes.plot(points[:, 0], points[:, 1], "o-", color=COLOURS[k], label=label)
             axes.plot(threshold, 0, "x", color=COLOURS[k], ms=8, mew=2)
-    axes.legend(title="zero of the growth (crosses: theory)", title_fontsize=7.5)
+    axes.set_ylim(bottom=-1.3)
+    axes.legend(title="zero of the growth (crosses: theory)", title_fontsize=7.5, loc="lower right")
     axes_labels(axes, "ω (A+/(ζr L²))", "growth (A+/(ζ⊥L⁴))", "onset")
 
 
