@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import assemble_laws, copies, costs, rft, shapes, stepping
+from . import assemble_grid, assemble_laws, copies, costs, rft, shapes, stepping
 from .along import alone, along, half
 from .assemble_loads import loads, number, triple
 from .case_schema import Coefficients, Matched
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from .fields import GridFields
     from .fluid import Fluid
     from .grid import Grid
-    from .immersed import Coupling
-    from .kernels import Kernel
     from .laws import MomentLaw
     from .matched import Match
     from .thermal import Noise
@@ -203,7 +201,7 @@ def matching(case: Case, filament: Filament) -> Match | None:
         return None
     from . import matched
 
-    box, cells = case.fluid.box, case.fluid.cells or cells_of_thickness(case)
+    box, cells = case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case)
     assert box is not None
     nodes, radius = 1 + round(drag.matched * (filament.nodes - 1) / filament.length), 0.0
     if case.fluid.rotation == "grid" and filament.twisting is not None and filament.radius is not None:
@@ -240,13 +238,6 @@ def flow(case: Case) -> Callable[[np.ndarray, float], np.ndarray] | None:
     return lambda r, t: velocity(*r.T, t)
 
 
-def kernel(case: Case) -> Kernel:
-    """The discrete delta kernel of the case."""
-    from .kernels import KERNELS
-
-    return KERNELS[case.fluid.kernel]
-
-
 def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     """The fluid of the case, the method chosen, and its grid (None in RFT)."""
     if case.fluid.model == "rft":
@@ -255,12 +246,12 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     from .grid import Grid
 
     assert case.fluid.box is not None
-    grid, eta = Grid(case.fluid.box, case.fluid.cells or cells_of_thickness(case)), case.fluid.viscosity
-    slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, eta, stacked.spacing)
-    spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 and not stirs(case) else None
+    grid, eta = Grid(case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case)), case.fluid.viscosity
+    slip = immersed.slip_mobility(case.fluid.slip, assemble_grid.kernel(case), grid, eta, stacked.spacing)
+    spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 and not assemble_grid.stirs(case) else None
     number = np.float32 if case.fluid.precision == "single" else np.float64
-    coupled = coupling(case, stacked)
-    made = immersed.Immersed(grid, kernel(case), eta, slip, spin, flow(case), stacked.nodes, number, coupled)
+    coupled, delta = assemble_grid.coupling(case, stacked), assemble_grid.kernel(case)
+    made = immersed.Immersed(grid, delta, eta, slip, spin, flow(case), stacked.nodes, number, coupled)
     seconds = method_seconds(case, stacked, grid)
     # The averaged table is an approximation: on request only.
     exact = [name for name in seconds if name != "averaged"]
@@ -282,7 +273,7 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
 def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Solver:
     """What evaluates velocities by FFT: of the whole grid, or where that is cheaper of the filaments' bounding box."""
     eta, threads = case.fluid.viscosity, case.compute.threads
-    if stirs(case):
+    if assemble_grid.stirs(case):
         from .stirring import StirredSolve
 
         return StirredSolve(grid, eta, threads)
@@ -293,51 +284,6 @@ def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Sol
     from .pruned import PrunedSolve
 
     return PrunedSolve(grid, eta, threads)
-
-
-def stirs(case: Case) -> bool:
-    """Whether twist torques go onto the grid."""
-    twisting = any(f.twisting is not None for f in case.filaments.values())
-    return case.fluid.model != "rft" and case.fluid.rotation == "grid" and twisting
-
-
-def coupling(case: Case, stacked: Stacked) -> Coupling:
-    """What of a node goes through the grid."""
-    if not stirs(case):
-        from .mobility import TRANSLATION
-
-        return TRANSLATION
-    from .stirring import Stirring, own_spin
-
-    n, volume = len(stacked.s), stacked.mechanics.mesh.volume
-    widest = twist_radius(case)
-    radius, twists = np.full(n, widest), np.zeros(n)
-    for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
-        twists[where] = filament.twisting is not None
-        if filament.radius is not None:
-            radius[where] = alone(filament.radius, stacked.s[where])
-    spin = own_spin(radius, widest, case.fluid.slip, case.fluid.viscosity, volume)
-    # Where a filament does not twist its turn is held; any positive number will do for the row.
-    return Stirring(np.where(twists > 0, spin, 1.0), twists)
-
-
-def own_mobility(case: Case, stacked: Stacked, grid: Grid) -> np.ndarray:
-    """What each node moves by its own force or torque beyond the grid's answer, (n, c): slip, and spin below h."""
-    from . import immersed
-
-    slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, case.fluid.viscosity, stacked.spacing)
-    return coupling(case, stacked).own(slip)
-
-
-def spacing(case: Case) -> float:
-    """The grid's h. Raises CaseError where ``thickness`` has none."""
-    assert case.fluid.box is not None
-    return case.fluid.box[0] / (case.fluid.cells or cells_of_thickness(case))[0]
-
-
-def twist_radius(case: Case) -> float:
-    """The largest radius that a rod on the case's grid has when it spins: the kernel's, less by the slip."""
-    return kernel(case).twist_radius * spacing(case) / float(np.sqrt(1.0 + case.fluid.slip))
 
 
 def fields(case: Case, fluid: Fluid, grid: Grid) -> GridFields:
@@ -355,8 +301,8 @@ def _box(case: Case, stacked: Stacked, grid: Grid) -> list[int]:
     """Extents, in cells, of the box that holds the filaments' stencils at the start."""
     from .pruned import bounding_box
 
-    base, _ = kernel(case).stencil(grid.coordinates(stacked.start.r))
-    return bounding_box(base, kernel(case).points, grid.cells)[1]
+    base, _ = assemble_grid.kernel(case).stencil(grid.coordinates(stacked.start.r))
+    return bounding_box(base, assemble_grid.kernel(case).points, grid.cells)[1]
 
 
 def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str, float]:
@@ -365,13 +311,13 @@ def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str,
     if grid is None:
         return costs.seconds_a_step(case, rods)
     cells, sizes = grid.cells.tolist(), _box(case, stacked, grid)
-    return costs.seconds_a_step(case, rods, cells, sizes, stirs(case))
+    return costs.seconds_a_step(case, rods, cells, sizes, assemble_grid.stirs(case))
 
 
 def _worth(case: Case, stacked: Stacked, grid: Grid) -> float:
     """What factoring the rods' own systems costs, in velocity evaluations."""
     evaluation = costs.evaluation(grid.cells.tolist(), _box(case, stacked, grid), len(stacked.s))
-    parts = 4 if stirs(case) else 3
+    parts = 4 if assemble_grid.stirs(case) else 3
     return sum(costs.factored(where.stop - where.start, parts) for where in stacked.nodes) / evaluation
 
 
@@ -379,28 +325,6 @@ def fills_little(case: Case, stacked: Stacked, grid: Grid) -> bool:
     """Whether transforms of the filaments' bounding box alone are the cheaper ones."""
     cells = grid.cells.tolist()
     return costs.pruned_evaluation(cells, _box(case, stacked, grid)) < costs.full_evaluation(cells)
-
-
-def cells_of_thickness(case: Case) -> tuple[int, int, int]:
-    """The cells that give ``thickness`` as the hydrodynamic line radius, or the nearest below. Raises CaseError."""
-    from .grid import cells_for, smooth
-
-    box, thickness = case.fluid.box, case.fluid.thickness
-    assert box is not None
-    assert thickness is not None
-    largest = thickness / kernel(case).line_radius
-    cells = cells_for(box, largest)
-    if cells is None:
-        n = next(k for k in range(int(np.ceil(box[0] / largest)), 10**6) if smooth(k))
-        h = box[0] / n
-        fits = [h * next(k for k in range(max(1, round(side / h)), 10**6) if smooth(k)) for side in box]
-        raise CaseError(
-            [
-                f"{case.file}: fluid.thickness: found {thickness:g}, for which no grid within 20 % has smooth numbers "
-                f"of cells on all axes of box = {list(box)}; allowed: for example box = {[round(x, 10) for x in fits]}"
-            ]
-        )
-    return cells
 
 
 def noise(case: Case, stacked: Stacked) -> Noise | None:

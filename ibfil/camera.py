@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import assemble
+from . import assemble, assemble_grid
 from .frames import FilamentFrame, Frame
 from .loads import EndMoment
 
@@ -123,7 +123,7 @@ class Camera:
             carried = 0.0 if flow is None else float(np.sum(force[:, :3] * flow(shape.r, time)))
             return {"dissipation": float(np.sum(now.velocity * force)) - carried}
         heat, power = self._grid().dissipation(*self._pushes(now))
-        own = assemble.own_mobility(self.case, self._rods, self.grid)
+        own = assemble_grid.own_mobility(self.case, self._rods, self.grid)
         slip = float(np.sum(own * force[:, : own.shape[1]] ** 2))
         return {"dissipation": heat, "grid_power": power, "slip_power": slip}
 
@@ -137,8 +137,8 @@ class Camera:
     def _pushes(self, now: Moment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The stencils of the nodes, and the vectors that they put onto the grid."""
         assert self.grid is not None
-        base, weights = assemble.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
-        coupling = assemble.coupling(self.case, self._rods)
+        base, weights = assemble_grid.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
+        coupling = assemble_grid.coupling(self.case, self._rods)
         return base, weights, coupling.lift(coupling.axes(now.state.shape.e3), now.force)
 
     def _grid_fields(self, fields: Sequence[str], now: Moment) -> dict[str, np.ndarray]:

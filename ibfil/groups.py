@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, shapes, timescales
+from . import assemble, assemble_grid, shapes, timescales
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -44,7 +44,7 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
         out["ds/h"] = length / (filament.nodes - 1) / grid.spacing
         out["a/L"] = KERNELS[case.fluid.kernel].line_radius * grid.spacing / length
         if filament.twisting is not None and case.fluid.rotation == "grid":
-            out["a/L when spun"] = _spun(filament, assemble.twist_radius(case)) / length
+            out["a/L when spun"] = _spun(filament, assemble_grid.twist_radius(case)) / length
         wave = _wave(filament)
         if wave:
             out["wavelength/h"] = 2 * np.pi / wave / grid.spacing
@@ -130,9 +130,9 @@ def warnings(simulation: Simulation) -> list[str]:
 def _of_spin(simulation: Simulation, key: str, filament) -> list[str]:
     """A rod that is thicker than what the grid can make spin."""
     case = simulation.case
-    if not assemble.stirs(case) or filament.twisting is None or filament.radius is None:
+    if not assemble_grid.stirs(case) or filament.twisting is None or filament.radius is None:
         return []
-    widest = assemble.twist_radius(case)
+    widest = assemble_grid.twist_radius(case)
     largest = float(np.max(filament.radius.bind("s", "t")(np.linspace(0.0, filament.length, 11), 0.0)))
     out = []
     if case.fluid.slip == 0 and largest > FULL * widest:

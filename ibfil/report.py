@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, costs
+from . import assemble_grid, costs
 from .case import idle_keys
 from .case_schema import Matched
 from .groups import groups, warnings
@@ -74,7 +74,7 @@ def modelled(case: Case) -> list[str]:
         terms += [word for key, word in _LOADS.items() if getattr(f.loads, key, None) is not None]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     if case.fluid.flow is not None:
-        spins = "and spins them by half its vorticity" if assemble.stirs(case) else "and does not spin them"
+        spins = "and spins them by half its vorticity" if assemble_grid.stirs(case) else "and does not spin them"
         out.append(f"a background flow, which moves the nodes {spins}")
     if case.contact is not None:
         out.append(_contact(case.contact))
@@ -92,7 +92,7 @@ def modelled(case: Case) -> list[str]:
         out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
     if fluid.slip:
         out.append(f"slip mobility of {fluid.slip:g} of a point's own, against locking")
-    if assemble.stirs(case):
+    if assemble_grid.stirs(case):
         out.append("twist torques stir the grid as half a curl, rods spin with half its vorticity (rotation = grid)")
     elif any(f.twisting is not None for f in case.filaments.values()):
         out.append("spin against the rod's own drag (rotation = local)")
@@ -122,7 +122,7 @@ def absent(case: Case) -> list[str]:
         out.append("twist: no twist unknowns; e1 is carried along")
     if case.fluid.model == "rft":
         out.append("hydrodynamic interaction; grid and FFT plans")
-    elif not assemble.stirs(case):
+    elif not assemble_grid.stirs(case):
         out.append("torque coupling of the spin to the grid")
     if case.output.grid_every is None:
         out.append("field output")
@@ -161,7 +161,7 @@ def memory(simulation: Simulation) -> dict[str, float]:
     from .kernels import KERNELS
 
     cells = simulation.grid.cells
-    rim, parts = KERNELS[case.fluid.kernel].points - 1, 4 if assemble.stirs(case) else 3
+    rim, parts = KERNELS[case.fluid.kernel].points - 1, 4 if assemble_grid.stirs(case) else 3
     number = 4.0 if case.fluid.precision == "single" else 8.0
     out["mobility table"] = number * (15 if parts == 4 else 6) * float(np.prod(cells // 2 + 1 + 2 * rim))
     if simulation.method == "averaged":
@@ -197,11 +197,11 @@ def _costs(simulation: Simulation) -> list[str]:
     unknowns = simulation.mechanics.unknowns
     lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
     if simulation.grid is not None:
-        h, kernel = simulation.grid.spacing, assemble.kernel(case)
+        h, kernel = simulation.grid.spacing, assemble_grid.kernel(case)
         lines.append(f"grid {' x '.join(str(n) for n in simulation.grid.cells)}, h = {h:.4g}")
         lines.append(
             f"a rod on it is as thick as its kernel: radius {kernel.line_radius * h:.4g} when dragged, "
-            f"{assemble.twist_radius(case):.4g} when spun by the grid; no one radius of RFT has both"
+            f"{assemble_grid.twist_radius(case):.4g} when spun by the grid; no one radius of RFT has both"
         )
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())

@@ -49,7 +49,7 @@ def _radius(run: RunFile, name: str) -> np.ndarray:
         return np.broadcast_to(np.asarray(filament.radius.bind("s")(s), float), s.shape)
     if run.case.fluid.model == "rft":
         return np.full(s.shape, 0.01 * filament.length)
-    from .assemble import cells_of_thickness, kernel
+    from .assemble_grid import cells_of_thickness, kernel
 
     fluid = run.case.fluid
     assert fluid.box is not None
