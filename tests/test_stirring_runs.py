@@ -240,3 +240,23 @@ def test_frames_hold_the_torque_and_the_spin_and_their_power():
     observed = {k: looking.summaries()[k].value for k in ("torque", "power")}
     assert observed["torque"] == pytest.approx(frame.diagnostics["net_torque"], abs=1e-12)
     assert observed["power"] == pytest.approx(frame.diagnostics["power"], rel=1e-12)
+
+
+def test_a_free_rod_gives_the_fluid_neither_force_nor_torque():
+    """Forces and twist torques together, as the grid feels them, with forces that are free of torque."""
+    rod = {**RIBBON, "force": "torque-free", "derivative": 2, "start": {"end": "free"}}
+    frame = run(scene({"rod": rod}, GRID, end=0.1, step=0.02)).frame()
+    felt = frame.filaments["rod"]
+    assert np.abs(frame.diagnostics["net_force"]).max() < 1e-11 * np.abs(felt.force).sum()
+    own = np.abs(np.cross(felt.position, felt.force)).sum()
+    assert np.abs(felt.torque).sum() > 0.01 * own
+    assert np.abs(frame.diagnostics["net_torque"]).max() < 1e-7 * own  # Newton's tolerance
+
+
+def test_a_table_in_single_precision_is_one_to_its_digits():
+    paths = [
+        run(scene({"rod": RIBBON}, {**GRID, "method": "table", "precision": p}, end=0.2, step=0.02)).shape
+        for p in ("double", "single")
+    ]
+    assert 0 < np.abs(paths[0].r - paths[1].r).max() < 1e-4
+    assert np.abs(paths[0].e1 - paths[1].e1).max() < 1e-4
