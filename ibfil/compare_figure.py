@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .figure import AXES, STYLE, plane_of_motion, with_units
-from .trade_figure import COLOURS, MARKS
+from .trade_figure import COLOURS, MARKS, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def draw(made: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
         fig.suptitle(textwrap.fill(made.title, 100), x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         for axes, letter in zip(panels.flat, "abcd", strict=True):
             axes.set_title(f"({letter})", loc="left", fontsize=9)
-        fig.savefig(path, dpi=170)
+        save(fig, path)
 
 
 Looks = Mapping[str, tuple]

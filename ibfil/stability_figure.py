@@ -11,6 +11,7 @@ import numpy as np
 
 from .figure import STYLE
 from .stability import CLASSES
+from .trade_figure import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +53,7 @@ def draw(made: Map, path: Path) -> None:
         _legend(fig, made)
         wide = int(9.5 * size[0])
         fig.suptitle(textwrap.fill(made.title, wide), x=0.012, ha="left", fontsize=10, fontweight="bold")
-        fig.savefig(path, dpi=170)
+        save(fig, path)
 
 
 def _name(axis: Axis) -> str:

@@ -162,8 +162,8 @@ def _budget(seconds: float | None) -> Iterator[Callable[[], bool]]:
         yield lambda: False
         return
     before = signal.signal(signal.SIGALRM, end)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
+        signal.setitimer(signal.ITIMER_REAL, seconds)
         yield lambda: bool(over)
     except (Interrupted, KeyboardInterrupt):
         if over:

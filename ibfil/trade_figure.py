@@ -10,6 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from .trade import Trade, Tried
 
@@ -49,7 +50,13 @@ def draw(made: Trade, path: Path) -> None:
             title_fontsize=7,
             alignment="left",
         )
-        fig.savefig(path, dpi=170)
+        save(fig, path)
+
+
+def save(fig: Figure, path: Path) -> None:
+    """Write a figure as a picture, and beside it as PDF, for papers."""
+    fig.savefig(path, dpi=170)
+    fig.savefig(path.with_suffix(".pdf"))
 
 
 def _few_ticks(axes: Axes) -> None:
