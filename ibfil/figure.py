@@ -1,8 +1,8 @@
 """One figure for a run: `ibfil show RUN.h5 --plot FILE.png`.
 
 Shapes over time in the plane of largest motion, the path of the centroids, the flow in that plane where a
-velocity field was put out, and the observables, power and stretch against time. Drawn by matplotlib without a
-display.
+velocity field was put out, and the observables, speed, elastic energy, power and stretch against time. Drawn by
+matplotlib without a display.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .energy import elastic_energy
 from .errors import CaseError
+from .fits import trapezoid_weights
+from .units import label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
 AXES = "xyz"
 ENDINGS = (".png", ".pdf", ".svg")
 SHAPES = 14  # shapes drawn of each filament, evenly spaced in time
-SERIES = 5  # observables drawn; the rest are in --csv
+SERIES = 3  # observables drawn; the rest are in --csv
 DIAGNOSTICS = {
     "power on the fluid": {"power": ""},
     "stretch of segments": {"stretch_max": "max", "stretch_min": "min"},
@@ -220,11 +223,28 @@ def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
         values = np.asarray(column)
         lines = {"": values} if values.ndim == 1 else dict(zip(AXES, values.T, strict=True))
         series.append((_meaning(run, name), run.units(f"observables/{name}"), lines))
+    series += _motion(run)
     for title, parts in DIAGNOSTICS.items():
-        lines = {label: np.asarray(run.diagnostics[key]) for key, label in parts.items() if key in run.diagnostics}
+        lines = {word: np.asarray(run.diagnostics[key]) for key, word in parts.items() if key in run.diagnostics}
         if lines:
             series.append((title, run.units(f"diagnostics/{next(iter(parts))}"), lines))
     return series
+
+
+def _motion(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
+    """Speed of the centroid and elastic energy, a line for each of the first filaments."""
+    speeds, energies = {}, {}
+    for name in list(run.filaments)[: len(COLOURS)]:
+        s = run.arclength(name)
+        words = name if len(run.filaments) > 1 else ""
+        mean = np.einsum("tnc,n->tc", np.asarray(run.filaments[name]["velocity"]), trapezoid_weights(s) / s[-1])
+        speeds[words] = np.linalg.norm(mean, axis=1)
+        energy = elastic_energy(run, name)
+        if energy is not None:
+            energies[words] = energy
+    units = run.case.units
+    out = [("speed of the centroid", label(units, "length/time"), speeds)]
+    return out + ([("elastic energy", label(units, "force length"), energies)] if energies else [])
 
 
 def _meaning(run: RunFile, name: str) -> str:
@@ -241,8 +261,8 @@ def _against_time(axes: Axes, run: RunFile, title: str, units: str, lines: dict[
     A start that dwarfs all the rest, as of a shape that has yet to relax, is left out of the scale, and the
     title says so.
     """
-    for (label, values), colour in zip(lines.items(), COLOURS, strict=False):
-        axes.plot(run.time, values, color=colour, label=label)
+    for (word, values), colour in zip(lines.items(), COLOURS, strict=False):
+        axes.plot(run.time, values, color=colour, label=word)
     if len(lines) > 1:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.0, borderaxespad=0.0)
     title = with_units(title, units)

@@ -111,6 +111,8 @@ def test_figure_shows_all_there_is(run):
         "Flow at z",
         "tip: position (um)",
         "speed: position (um)",
+        "speed of the centroid (um/s)",
+        "elastic energy (pN um)",
         "power on the fluid (pN um/s)",
     ):
         assert part in titles
@@ -192,6 +194,9 @@ def test_a_run_without_observables_fields_or_stretch_is_drawn_too(run):
         observables={},
         diagnostics={"power": run.diagnostics["power"]},
         units=run.units,
+        arclength=run.arclength,
+        filament=run.filament,
     )
     titles = {axes.get_title(loc="left") for axes in figure.figure(bare).axes}
-    assert titles - {""} == {"Shapes", "Centroid: start (ring) to end (dot)", "power on the fluid (pN um/s)"}
+    motion = {"speed of the centroid (um/s)", "elastic energy (pN um)"}
+    assert titles - {""} - motion == {"Shapes", "Centroid: start (ring) to end (dot)", "power on the fluid (pN um/s)"}
