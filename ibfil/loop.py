@@ -113,6 +113,7 @@ class Loop:
                     grid=self._grid_place(),
                     method=self.simulation.method,
                     wisdom=self.simulation.wisdom,
+                    groups=self.simulation.groups,
                     expected=sum(due.output for due in rest) + 1,
                     overwrite=overwrite,
                 )

@@ -1,6 +1,6 @@
 """Reading a run file: what `ibfil run` wrote, as lazy arrays. The writing is in recorder.py.
 
-    /            format, format_version, ibfil_version, case, created, finished, versions, method, wisdom,
+    /            format, format_version, ibfil_version, case, created, finished, versions, method, wisdom, groups,
                  status, reason, steps, wall_time, pace_seconds, pace_processor, pace_time
     /time (T,)   /filaments/NAME/...   /observables/NAME   /diagnostics/NAME   /grid/time, /grid/FIELD
 
@@ -238,6 +238,11 @@ class RunFile:
     def wisdom(self) -> str:
         """The FFTW wisdom its plans came from; "" where there are none."""
         return self._attribute("wisdom")
+
+    @property
+    def groups(self) -> dict[str, float]:
+        """The dimensionless groups of the scene (sperm number, EA L^2/A ...), as `ibfil run` began with."""
+        return json.loads(str(self._file.attrs.get("groups", "{}")))
 
     @property
     def versions(self) -> dict[str, str]:

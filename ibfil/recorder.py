@@ -16,6 +16,7 @@ from dataclasses import fields as fields_of
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
@@ -115,12 +116,13 @@ class Recorder:
         grid: GridPlace | None = None,
         method: str = "",
         wisdom: str = "",
+        groups: Mapping[str, float] = MappingProxyType({}),
         expected: int = 1024,
         overwrite: bool = False,
     ) -> Recorder:
         """Begin a run file with its first output; ``expected`` outputs in all (sizes chunks, no limit).
 
-        ``series`` holds the observables' values, ``meanings`` what they are. Raises RunFileError where the
+        ``series`` holds the observables' values, ``meanings`` what they are, ``groups`` the dimensionless ones. Raises RunFileError where the
         file exists and ``overwrite`` is not set, or another process is writing it.
         """
         refuse_existing(path, overwrite)
@@ -131,7 +133,7 @@ class Recorder:
             checkpoint_path(path).unlink(missing_ok=True)  # before the run it belongs to
             file.clear()
             self._h5 = h5py.File(file, "w")
-            self._h5.attrs.update(_about(case, method, wisdom))
+            self._h5.attrs.update(_about(case, method, wisdom, groups))
             for group in ("filaments", "observables", "diagnostics"):
                 self._h5.create_group(group)
             for name, value in _rows(frame, series).items():
@@ -368,7 +370,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _about(case: Case, method: str, wisdom: str) -> dict[str, Any]:
+def _about(case: Case, method: str, wisdom: str, groups: Mapping[str, float]) -> dict[str, Any]:
     """Return the attributes of a run that begins."""
     return {
         "format": FORMAT,
@@ -380,6 +382,7 @@ def _about(case: Case, method: str, wisdom: str) -> dict[str, Any]:
         "versions": json.dumps(versions()),
         "method": method,
         "wisdom": wisdom,
+        "groups": json.dumps(dict(groups)),
         "status": "running",
         "reason": "",
         "steps": 0,

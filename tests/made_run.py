@@ -133,7 +133,17 @@ def make_run(path: Path, until: float = 1.0, status: str = "finished") -> Path:
         if recorder is None:
             meanings = {k: Meaning(o.dimension, o.description) for k, o in seen.observables.items()}
             place = GridPlace(ORIGIN, SPACING, 1)
-            recorder = Recorder.create(path, case, now, values, meanings, grid=place, method="made", overwrite=True)
+            recorder = Recorder.create(
+                path,
+                case,
+                now,
+                values,
+                meanings,
+                grid=place,
+                method="made",
+                groups={"sperm number": 4.5},
+                overwrite=True,
+            )
         else:
             recorder.append(now, values)
         if now.grid:

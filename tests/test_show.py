@@ -50,7 +50,9 @@ def test_digest_gives_the_size_of_a_vector_diagnostic(run):
 
 
 def test_text_tells_what_a_user_asks_first(run):
+    assert show.digest(run)["groups"] == run.groups == {"sperm number": 4.5}
     text = show.as_text(show.digest(run))
+    assert "sperm number = 4.5" in text
     for part in (
         "Two made filaments",
         "by hand",
