@@ -122,8 +122,9 @@ class Recorder:
     ) -> Recorder:
         """Begin a run file with its first output; ``expected`` outputs in all (sizes chunks, no limit).
 
-        ``series`` holds the observables' values, ``meanings`` what they are, ``groups`` the dimensionless ones. Raises RunFileError where the
-        file exists and ``overwrite`` is not set, or another process is writing it.
+        ``series`` holds the observables' values, ``meanings`` what they are, ``groups`` the dimensionless numbers of
+        the scene. Raises RunFileError where the file exists and ``overwrite`` is not set, or another process is
+        writing it.
         """
         refuse_existing(path, overwrite)
         with _writing(path), _owned(path):
