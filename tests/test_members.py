@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -183,8 +184,6 @@ class Killer(Member):
     """A member whose process is killed when it is about to be run; in this process it is as any other."""
 
     def resolved(self):
-        import multiprocessing
-
         if multiprocessing.parent_process() is not None:
             time.sleep(0.2)
             os.kill(os.getpid(), signal.SIGKILL)
@@ -209,3 +208,11 @@ def test_ctrl_c_before_the_first_step_is_no_failure(tmp_path, monkeypatch, said)
     monkeypatch.setattr(module, "_run", cut)
     with pytest.raises(Interrupted, match="0 of 2 runs are done"):
         run_members([GOOD, STIFF], tmp_path, say=said.append)
+
+
+def test_a_process_pool_can_be_handed_in(tmp_path, said):
+    """One of concurrent.futures itself, whose processes begin with nothing of this one."""
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        outcomes = run_members([GOOD, ODD, STIFF], tmp_path, executor=pool, say=said.append)
+    assert statuses(outcomes) == {"good": "finished", "odd": "failed", "stiff": "finished"}
+    assert all(outcome.path.is_file() for outcome in outcomes if outcome.done)
