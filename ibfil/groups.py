@@ -105,11 +105,7 @@ def warnings(simulation: Simulation) -> list[str]:
                 "rod is as thick as its waves; take more fluid.cells"
             )
         out += _of_spin(simulation, key, filament)
-        if simulation.grid is not None and filament.length > min(simulation.grid.box):
-            out.append(
-                f"{key}: length {filament.length:g} is more than the shortest side of the box, "
-                f"{min(simulation.grid.box):g}: the filament meets its own periodic images; take a larger fluid.box"
-            )
+        out += _of_images(simulation, key, name)
         if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * FINE:
             out.append(f"time.step: omega dt = {found['omega dt']:.3g}; the schemes are accurate up to about {FINE}")
         if found.get("matched scatter", 0.0) > UNEVEN:
@@ -125,6 +121,21 @@ def warnings(simulation: Simulation) -> list[str]:
         where = simulation.nodes(name)
         out += shapes.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
     return out + _of_run(simulation)
+
+
+def _of_images(simulation: Simulation, key: str, name: str) -> list[str]:
+    """A filament that, as it begins, reaches from one face of the box to the other."""
+    if simulation.grid is None:
+        return []
+    box = np.asarray(simulation.grid.box)
+    spans = np.ptp(simulation.shape.r[simulation.nodes(name)], axis=0)
+    axis = int(np.argmax(spans / box))
+    if spans[axis] <= box[axis]:
+        return []
+    return [
+        f"{key}: spans {spans[axis]:.4g} along {'xyz'[axis]}, more than the box, {box[axis]:g}: "
+        "the filament meets its own periodic images; take a larger fluid.box"
+    ]
 
 
 def _of_spin(simulation: Simulation, key: str, filament) -> list[str]:
