@@ -142,7 +142,9 @@ class FileShape(Shape):
 class RunShape(Shape):
     """The shape a filament had in another run."""
 
-    kind: Literal["run"] = Field("run", description="the shape of another run")
+    kind: Literal["run"] = Field(
+        "run", description="the filament of this name as it stood in another run; other nodes by splines over arclength"
+    )
     path: str = Field(description="the run file, relative to the case", examples=["run.h5"])
     time: Annotated[float | Literal["last"], Number(("last",), low=0, open=False)] = Field(
         "last", description="the time of that run to start from"

@@ -79,6 +79,10 @@ class Run(RunFile):
 
         velocity, force, moment, strain, e1, e2, e3 (N, 3), tension, tube_radius, arclength (N,), and the number of the
         filament. ``run.mesh().tube(scalars="tube_radius", absolute=True).plot()`` shows rods to scale.
+
+        >>> with ibfil.open("run.h5") as run:
+        ...     print(run.mesh(0.001).n_lines, run.mesh()["e3"].shape)
+        1 (9, 3)
         """
         import pyvista
 

@@ -128,7 +128,7 @@ class _Pictures:
             "slice": "flow in the plane through the middle",
             "glyphs": f"longest arrow: {self.fastest:.3g}, length as the root of the speed",
             "streamlines": "flow along the plane through the middle",
-        }.get(wish.flow, "")
+        }.get(wish.flow, _of_thickness(run))
         title = " ".join(run.case.title.split()) or run.path.stem
         pixel = 2 * self.frame.half / size[1]
         self.words = Words(title, tuple(bars), run.case.units.length, pixel, note)
@@ -161,6 +161,12 @@ class _Pictures:
     def close(self) -> None:
         """Give the window back."""
         self.stage.close()
+
+
+def _of_thickness(run: Run) -> str:
+    """What is said of rods that have no thickness to show: no radius in the case, and no grid that gives them one."""
+    bare = run.case.fluid.model == "rft" and any(run.filament(name).radius is None for name in run.filaments)
+    return "no radius given: drawn L/100 thick" if bare else ""
 
 
 def _time(time: float, run: Run) -> str:

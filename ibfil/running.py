@@ -43,6 +43,10 @@ def run(
 
     Raises CaseError (also where ``output`` exists and ``overwrite`` is not set), RunFailed, and Interrupted
     after Ctrl-C or SIGTERM; a second one kills.
+
+    >>> result = ibfil.run("case.toml", progress=False, log=lambda line: None)
+    >>> print(result.status, result.times.shape, result.series("tip").shape)
+    finished (3,) (3, 3)
     """
     if isinstance(case, str | Path):
         case = read_case(case)
