@@ -33,7 +33,7 @@ SCHEMES = {
     ("implicit", 1): ("1e-3", ("1e-4", "2e-4", "4e-4")),
     ("implicit", 2): ("1e-3", ("1e-3", "2e-3", "4e-3")),
 }
-QUICK = {**SCHEMES, ("semi-implicit", 1): ("1e-4", ("1e-4", "2e-4", "4e-4"))}
+QUICK = {**SCHEMES, ("semi-implicit", 1): ("1e-4", ("2e-5", "4e-5", "8e-5"))}
 
 
 def members(quick: bool) -> list[Member]:
