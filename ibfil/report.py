@@ -203,6 +203,10 @@ def _costs(simulation: Simulation) -> list[str]:
             f"a rod on it is as thick as its kernel: radius {kernel.line_radius * h:.4g} when dragged, "
             f"{assemble_grid.twist_radius(case):.4g} when spun by the grid; no one radius of RFT has both"
         )
+        lines.append(
+            f"kernel {case.fluid.kernel}: one node moves as a sphere of radius {kernel.point_radius * h:.4g}; its "
+            f"mobility differs by {kernel.translation_error:.2g} of itself between places in a cell"
+        )
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scenes import STOKES, swimmer
 from scipy.optimize import brentq
 from scipy.special import gamma
 
@@ -14,6 +15,7 @@ from ibfil import mobility
 from ibfil.case_checks import SUPPORT
 from ibfil.grid import Grid
 from ibfil.kernels import KERNELS, Kernel
+from ibfil.report import report
 
 ALL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 OFFSETS = np.concatenate([np.arange(16) / 16, np.random.default_rng(0).random(200)])
@@ -228,3 +230,14 @@ def test_twist_radius(name, radius):
 def test_schema_and_package_name_the_same_kernels():
     assert set(SUPPORT) == set(KERNELS)
     assert all(name == kernel.name for name, kernel in KERNELS.items())
+
+
+@pytest.mark.parametrize("name", sorted(KERNELS))
+def test_check_tells_the_radii_and_the_translation_error(name):
+    """On a grid of h = 1/16."""
+    kernel, text = KERNELS[name], report(swimmer({**STOKES, "kernel": name}, end=0.1))
+    assert f"radius {kernel.line_radius / 16:.4g} when dragged" in text
+    told = (
+        f"kernel {name}: one node moves as a sphere of radius {kernel.point_radius / 16:.4g}; its mobility differs by"
+    )
+    assert f"{told} {kernel.translation_error:.2g} of itself" in text
