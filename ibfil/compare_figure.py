@@ -23,6 +23,7 @@ _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 _DRAWN = ("speed", "reaction at start", "reaction at finish", "power of the nodes", "dissipated by the fluid",
           "Lighthill efficiency", "frequency (angular)")  # fmt: skip
 _NEAR_ZERO = 1e-3  # of the largest component: a ratio of such numbers says nothing
+_CERTAIN = 0.3
 _NOISE = 1e-9  # of the largest number: what is left of a rod that rests
 
 
@@ -124,7 +125,8 @@ def _numbers(axes: Axes, made: Comparison, looks: Looks) -> None:
 
     def counts(key: str) -> bool:
         of_kind = max((size for word, size in across.items() if word in key), default=0.0)
-        return abs(first[key].value) > max(_NEAR_ZERO * of_kind, _NOISE * largest)
+        known = (first[key].error or 0.0) < _CERTAIN * abs(first[key].value)  # not what is left of a transient
+        return known and abs(first[key].value) > max(_NEAR_ZERO * of_kind, _NOISE * largest)
 
     names = [key for key in names if counts(key)][:9]
     step = 0.6 / max(len(columns) - 1, 1)

@@ -18,6 +18,7 @@ MOST = 4  # panels
 # Okabe and Ito: told apart by all eyes; with them the marks, for prints without colour.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKS = "osD^vPX"
+_APART = np.array([0.5, 0.12])  # decades between two texts
 
 
 def draw(made: Trade, path: Path) -> None:
@@ -37,9 +38,7 @@ def draw(made: Trade, path: Path) -> None:
         title = textwrap.fill(made.title or "error against wall time", 34 * len(measures) + 20)
         fig.suptitle(title, x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         about = f"{made.about['date']}, ibfil {made.about['versions']['ibfil']}, {made.about['machine']}"
-        bars = (
-            f"bars: range of {made.about['repeats']} runs, point: the fastest; hollow: under the reference's own error"
-        )
+        bars = f"bars: range of up to {made.about['repeats']} runs, point: the least; hollow: under the reference's own error"
         _few_ticks(panels[0])
         fig.legend(
             *panels[0].get_legend_handles_labels(),
@@ -123,8 +122,9 @@ def _panel(axes: Axes, made: Trade, measure: str, groups: dict[str, list[int]], 
         label="Pareto front",
         zorder=1,
     )
+    named: list[np.ndarray] = []  # places that have a text
     for number, (name, members) in enumerate(groups.items()):
-        _line(axes, [made.tried[i] for i in members], made, measure, name, along, number, high)
+        _line(axes, [made.tried[i] for i in members], made, measure, name, along, number, high, named)
     axes.set_ylim(low, high * 1.6)
     clock = {"wall": "seconds", "processor": "processor seconds"}[made.about["clock"]]
     axes.set_xlabel(f"{clock} a unit of simulated time")
@@ -134,7 +134,15 @@ def _panel(axes: Axes, made: Trade, measure: str, groups: dict[str, list[int]], 
 
 
 def _line(
-    axes: Axes, tried: list[Tried], made: Trade, measure: str, name: str, along: str, number: int, top: float
+    axes: Axes,
+    tried: list[Tried],
+    made: Trade,
+    measure: str,
+    name: str,
+    along: str,
+    number: int,
+    top: float,
+    named: list[np.ndarray],
 ) -> None:
     """The settings of one group: hollow where the reference cannot tell, crosses at the top where they failed."""
     colour, mark = COLOURS[number % len(COLOURS)], MARKS[number % len(MARKS)]
@@ -150,10 +158,12 @@ def _line(
     for one, cost, error in zip(done, x, y, strict=True):
         face = "white" if made.uncertain(one, measure) else colour
         axes.plot(cost, error, mark, color=colour, mfc=face, ms=5.5, zorder=3)
-    ends = [0, -1] if along and done else []
-    for i in ends:
-        words = f"{_tail(along)} {float(done[i].setting.values[along]):.3g}"
-        axes.annotate(words, (x[i], y[i]), (6, 3), textcoords="offset points", fontsize=6, color=colour)
+    for i in (0, -1) if along and done else ():
+        here = np.log10([x[i], y[i]])
+        if all(np.any(np.abs(here - there) > _APART) for there in named):
+            named.append(here)
+            words = f"{_tail(along)} {float(done[i].setting.values[along]):.3g}"
+            axes.annotate(words, (x[i], y[i]), (6, 3), textcoords="offset points", fontsize=6, color=colour)
     lost = [one for one in tried if one.status == "failed"]
     for one in lost:
         # Where a run fails at its first step it has no pace: at the left edge then.
