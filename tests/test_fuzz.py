@@ -237,7 +237,7 @@ def test_many_damaged_run_files(here, seed):
     def all_of(path: Path) -> list[list[str]]:
         return [*reading(path), ["vtk", str(path), "-o", str(path.with_name("out"))], ["run", "--resume", str(path)]]
 
-    tried_files(here, 100, seed, all_of)
+    tried_files(here, 25, seed, all_of)
 
 
 def test_a_hostile_case_inside_a_run_file_does_nothing(here):
