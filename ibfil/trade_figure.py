@@ -38,7 +38,8 @@ def draw(made: Trade, path: Path) -> None:
         title = textwrap.fill(made.title or "error against wall time", 34 * len(measures) + 20)
         fig.suptitle(title, x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         about = f"{made.about['date']}, ibfil {made.about['versions']['ibfil']}, {made.about['machine']}"
-        bars = f"bars: range of up to {made.about['repeats']} runs, point: the least; hollow: under the reference's own error"
+        many = made.about["repeats"]
+        bars = f"bars: range of up to {many} runs, point: the least; hollow: under the reference's own error"
         _few_ticks(panels[0])
         fig.legend(
             *panels[0].get_legend_handles_labels(),
