@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import wrapping
 from .energy import elastic_energy
 from .errors import CaseError
 from .fits import trapezoid_weights
@@ -210,10 +211,9 @@ def _window(values: Sequence[np.ndarray], axis: np.ndarray) -> tuple[float, floa
 
 def wrapped(r: np.ndarray, origin: np.ndarray, box: np.ndarray) -> np.ndarray:
     """Nodes (N, 3) brought into the periodic box, a row of NaN wherever the filament crosses its faces."""
-    image = np.floor((r - origin) / box)
-    inside = r - image * box
-    crossing = np.nonzero(np.any(np.diff(image, axis=0) != 0, axis=1))[0] + 1
-    return np.insert(inside, crossing, np.nan, axis=0)
+    pieces = wrapping.wrapped(r, origin, box)
+    inside = pieces.take(r) - pieces.image * box
+    return np.insert(inside, np.cumsum(pieces.lengths)[:-1], np.nan, axis=0)
 
 
 def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:

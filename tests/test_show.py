@@ -166,9 +166,9 @@ def test_a_straight_rod_along_x_is_seen_from_z():
 def test_wrapped_breaks_the_line_where_it_leaves_the_box():
     r = np.column_stack([np.array([0.5, 0.9, 1.1, 1.5]), np.zeros(4), np.full(4, -0.25)])
     got = figure.wrapped(r, origin=np.array([-1.0, -0.5, 0.0]), box=np.array([2.0, 1.0, 0.5]))
-    assert np.isnan(got[2]).all()
-    np.testing.assert_allclose(np.delete(got, 2, axis=0)[:, 0], [0.5, 0.9, -0.9, -0.5])
-    np.testing.assert_allclose(np.delete(got, 2, axis=0)[:, 2], 0.25)
+    assert np.isnan(got[3]).all()
+    np.testing.assert_allclose(np.delete(got, 3, axis=0)[:, 0], [0.5, 0.9, 1.0, -1.0, -0.9, -0.5])
+    np.testing.assert_allclose(np.delete(got, 3, axis=0)[:, 2], 0.25)
 
 
 def test_a_start_that_dwarfs_the_rest_is_left_out_of_the_scale():
