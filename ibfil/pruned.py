@@ -20,9 +20,9 @@ import pyfftw
 from numba import njit
 
 from .grid import Grid, interpolate, project, spread
+from .transforms import useful_threads
 
 _CACHE = 2**20  # bytes of a block of the third pass: what stays near the processor
-_SHARED = 2**19  # numbers of a transform below which a second thread costs more than it takes over
 _ROOM = 4  # extents are rounded up to this, so that plans serve while the filaments move
 
 
@@ -122,7 +122,7 @@ class _Passes:
 
 def _plan(source: np.ndarray, to: np.ndarray, axis: int, direction: str, threads: int) -> pyfftw.FFTW:
     flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT")
-    threads = threads if source.size > _SHARED else 1
+    threads = useful_threads(source.size, threads)
     return pyfftw.FFTW(
         source, to, axes=(axis,), direction=direction, flags=flags, threads=threads, planning_timelimit=20.0
     )

@@ -13,7 +13,7 @@ import pyfftw
 
 from .grid import interpolate, spread
 from .pruned import run_of_cells
-from .transforms import VectorTransform
+from .transforms import VectorTransform, useful_threads
 
 if TYPE_CHECKING:
     from .immersed import Nodes
@@ -42,8 +42,9 @@ class Slab:
 
     def _plan(self, source: np.ndarray, to: np.ndarray, axes: tuple[int, ...], direction: str) -> pyfftw.FFTW:
         flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT")
+        threads = useful_threads(source.size, self._threads)
         return pyfftw.FFTW(
-            source, to, axes=axes, direction=direction, flags=flags, threads=self._threads, planning_timelimit=20.0
+            source, to, axes=axes, direction=direction, flags=flags, threads=threads, planning_timelimit=20.0
         )
 
     def _planes(self, count: int) -> _Planes:

@@ -18,6 +18,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # else FFTW's threads spin 
 import pyfftw
 
 _LIMIT = 20.0  # seconds of planning a transform at the most
+_SHARED = 2**19  # numbers of a transform below which a second thread costs more on a busy machine than it takes over
 
 
 def wisdom_file() -> Path:
@@ -54,6 +55,11 @@ def remember() -> None:
             part.unlink()
 
 
+def useful_threads(size: int, threads: int) -> int:
+    """How many of ``threads`` a transform of ``size`` numbers is given: one below 80 cells a side."""
+    return threads if size > _SHARED else 1
+
+
 class VectorTransform:
     """Forward and backward transforms of ``real`` (3, nx, ny, nz) and ``modes`` (3, nx, ny, nz//2 + 1).
 
@@ -77,7 +83,7 @@ class VectorTransform:
                 axes=(0, 1, 2),
                 direction=direction,
                 flags=(planning,) if direction == "FFTW_FORWARD" else (planning, "FFTW_DESTROY_INPUT"),
-                threads=threads,
+                threads=useful_threads(self.size, threads),
                 planning_timelimit=_LIMIT,
             )
 
