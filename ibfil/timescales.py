@@ -36,7 +36,8 @@ def angular_rate(value: Callable[[float], np.ndarray], end: float) -> float:
     times = np.linspace(0.0, end, 400)
     h = 1e-7 * end
     samples = np.array([np.broadcast_to(value(t), np.shape(value(0.0))) for t in times]).reshape(400, -1)
-    change = np.array([np.ravel(value(t + h)) - np.ravel(value(t)) for t in times[:-1]]) / h
+    with np.errstate(invalid="ignore"):  # what has no value at some time is told when the run comes to it
+        change = np.array([np.ravel(value(t + h)) - np.ravel(value(t)) for t in times[:-1]]) / h
     size = 0.5 * float(np.max(np.ptp(samples, axis=0)))
     fastest = float(np.max(np.abs(change)))
     return fastest / size if size > 0 else 0.0

@@ -109,6 +109,8 @@ def trade(
 
     with _budget(budget) as left:
         reference = prove(case, overrides, folder, asked, nodes, run)
+        if left():  # the interrupt itself is lost where it comes while the garbage collector calls back
+            raise Interrupted
         measures = _proved(reference, asked, say)
         _rounds(members, folder / "runs", repeat, run, left, say)
     tried = tuple(_tried(one, folder / "runs", repeat, clock, reference, measures) for one in settings)
