@@ -16,6 +16,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from .expressions import BrokenParameter, Expression, ExpressionError, Parameters, parse, suggestion
 
 NUMBER = "a number (or constant expression)"
+SMALLEST, LARGEST = 1e-60, 1e60  # in size: beyond, products of a few numbers overflow
 
 
 def refuse(why: str = "") -> PydanticCustomError:
@@ -26,11 +27,15 @@ def refuse(why: str = "") -> PydanticCustomError:
 def read_expression(value: Any, variables: tuple[str, ...], parameters: Parameters | None) -> Expression:
     """``value`` as an Expression. Raises the error of a value that is not allowed."""
     try:
-        return parse(value, variables, parameters)
+        expression = parse(value, variables, parameters)
     except BrokenParameter:
         raise PydanticCustomError("told", "uses a parameter that is at fault") from None
     except ExpressionError as error:
         raise refuse(str(error) if isinstance(value, str) else "") from None
+    size = abs(expression.constant or 1.0)
+    if not SMALLEST <= size <= LARGEST:
+        raise refuse(f"no number but 0 is computed with that is not between {SMALLEST:g} and {LARGEST:g} in size")
+    return expression
 
 
 @dataclass(frozen=True)
