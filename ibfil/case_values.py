@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from .expressions import BrokenParameter, Expression, ExpressionError, Parameters, parse, suggestion
 
 NUMBER = "a number (or constant expression)"
-SMALLEST, LARGEST = 1e-60, 1e60  # in size: beyond, products of a few numbers overflow
+SMALLEST, LARGEST = 1e-60, 1e60  # beyond, products of a few numbers overflow or vanish
 
 
 def refuse(why: str = "") -> PydanticCustomError:
@@ -32,9 +32,8 @@ def read_expression(value: Any, variables: tuple[str, ...], parameters: Paramete
         raise PydanticCustomError("told", "uses a parameter that is at fault") from None
     except ExpressionError as error:
         raise refuse(str(error) if isinstance(value, str) else "") from None
-    size = abs(expression.constant or 1.0)
-    if not SMALLEST <= size <= LARGEST:
-        raise refuse(f"no number but 0 is computed with that is not between {SMALLEST:g} and {LARGEST:g} in size")
+    if abs(expression.constant or 0.0) > LARGEST:
+        raise refuse(f"larger than {LARGEST:g} in size")
     return expression
 
 
@@ -105,6 +104,8 @@ class Number(Kind):
         assert number is not None  # no variables were allowed
         if self.low is not None and (number <= self.low if self.open else number < self.low):
             raise refuse(f"which is {number:.6g}" if isinstance(value, str) else "")
+        if self.low == 0 and self.open and number < SMALLEST:
+            raise refuse(f"smaller than {SMALLEST:g}")
         return number
 
 
