@@ -22,7 +22,7 @@ from .ends import EndOf, HeldEnds, Turn, spinning, steady, turned
 from .errors import CaseError
 from .geometry import Geometry
 from .mechanics import Mechanics
-from .rods import Segmented, stack
+from .mesh import Segmented, stack
 
 if TYPE_CHECKING:
     from . import stokes

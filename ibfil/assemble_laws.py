@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .case_filament import Filament
     from .expressions import Expression
     from .mechanics import Law
-    from .rods import Mesh
+    from .mesh import Mesh
 
 
 def law(

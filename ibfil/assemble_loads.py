@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .loads import ActiveMoment, BodyForce, Dead, EndMoment, Follower, Place, Tether
-from .rods import Mesh
+from .mesh import Mesh
 
 if TYPE_CHECKING:
     from .case_filament import End, Filament

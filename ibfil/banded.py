@@ -15,7 +15,7 @@ from numba import njit
 from scipy.linalg import solve_banded
 
 from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
-from .rods import Mesh
+from .mesh import Mesh
 
 
 class Profile(NamedTuple):

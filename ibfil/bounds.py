@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from .geometry import Geometry
-from .rods import Mesh
+from .mesh import Mesh
 
 LONGEST, SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
 LARGEST_TWIST = 0.95  # of sin(O3 ds): Eq. 39 stops resisting at 1

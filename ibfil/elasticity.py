@@ -12,7 +12,9 @@ The force through the face between nodes i and i + 1, with M3 at the half node (
 Misprints of the paper that stand corrected here: the sign of the twist term (Eq. 18, 21-24, 29, 30, 33, 44: printed
 ``- O1``), the tension (Eq. 20: ``EA (1 - ds/|d|)``, no factor ds) and the source of Eq. 36-38 (``O1 M2 - O2 M1``, which
 holds for every law and for moduli that vary along s). Both are differences of fluxes, so the forces sum to zero to
-round-off for any moment whatever.
+round-off for any moment whatever. M comes from laws.py, the strains O, r', r'' and d from geometry.py.
+
+In the names below ``gap`` is d, ``length`` |d|, ``speed`` |r'|, ``d1`` r', ``d2`` r'' and ``stretching`` EA.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import numpy as np
 from numba import njit
 
 from .geometry import D1, D2, E1, E2, E3, GAP, LENGTH, O1, O2, SPEED, Geometry
-from .rods import Mesh
+from .mesh import Mesh
 from .vectors import NOT_NEGATIVE, at, cross, dot, mix, plus, put, scaled
 
 

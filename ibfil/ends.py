@@ -2,7 +2,7 @@
 
 free      M = 0 (Q, M3, P and the twist source are zero there); nothing held
 hinged    r held, M = 0: a ball joint
-clamped   r and e3 held (the tangent stands in the stencils, rods.py); e1 held, spun or free
+clamped   r and e3 held (the tangent stands in the stencils, mesh.py); e1 held, spun or free
 """
 
 from __future__ import annotations

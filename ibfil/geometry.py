@@ -1,4 +1,7 @@
-"""From nodes and frames to tangents, strains and spacing: everything the forces are made of."""
+"""From nodes and frames to tangents, strains and spacing: everything the forces are made of.
+
+r' and r'' by the stencils of mesh.py (Eq. 15), e3 = r'/|r'|, e2 = e3 x e1, O1 = -e2.r'', O2 = e1.r'', O3 by Eq. 39.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from .frame import carried
-from .rods import Mesh
+from .mesh import Mesh
 from .vectors import NOT_NEGATIVE, at, cross, dot, plus, put, scaled
 
 # Columns of a configuration's table: vectors of three, then numbers.

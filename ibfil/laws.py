@@ -48,7 +48,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from .mechanics import Law
-    from .rods import Mesh
+    from .mesh import Mesh
 
 Field = Callable[[float], np.ndarray]  # of time, values at the nodes
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .geometry import Geometry
-from .rods import Mesh
+from .mesh import Mesh
 from .variation import Variation, cross
 
 OfTime = Callable[[float], np.ndarray]

@@ -14,7 +14,7 @@ from . import banded, elasticity
 from .elasticity import Moment
 from .fluid import Held
 from .geometry import Geometry, measure, moved, tangents
-from .rods import Mesh
+from .mesh import Mesh
 from .variation import Variation
 
 

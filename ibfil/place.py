@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .fits import trapezoid_weights
-from .rods import weights
+from .mesh import weights
 
 At = str | float | tuple[float, float]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .curves import Curve, unit
 from .errors import CaseError
-from .rods import clamped_weights, ghost_weights
+from .mesh import clamped_weights, ghost_weights
 
 if TYPE_CHECKING:
     from .case_filament import Filament, RunShape
@@ -78,7 +78,7 @@ def _clamps(run: RunFile, name: str, output: int, s: np.ndarray) -> list[np.ndar
     """The tangents that the run's own clamps hold; None at ends that are not clamped.
 
     The strain there tells: r'' = W r + w T with the tangent T normal to e1, so O1 = -(T x e1).r'' = -(T x e1).W r, and
-    T is at the angle asin(O1/|p|) from p, the part of W r normal to e1 (rods.py has W).
+    T is at the angle asin(O1/|p|) from p, the part of W r normal to e1 (mesh.py has W).
     """
     columns, filament = run.filaments[name], run.filament(name)
     r, e1, strain = (columns[key][output] for key in ("position", "e1", "strain"))

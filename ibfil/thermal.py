@@ -27,7 +27,7 @@ import numpy as np
 
 from .fluid import Fluid, Held
 from .geometry import Geometry
-from .rods import Mesh
+from .mesh import Mesh
 from .stepping import Rods, State, Step
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from .elasticity import Moment
 from .frame import carry
 from .geometry import Geometry
 from .mechanics import Mechanics, TangentReversed
-from .rods import Mesh
+from .mesh import Mesh
 from .variation import Shift, Variation
 
 

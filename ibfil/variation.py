@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from .geometry import Geometry
-from .rods import Mesh
+from .mesh import Mesh
 
 Shift = int | np.ndarray
 

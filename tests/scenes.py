@@ -16,7 +16,7 @@ from ibfil.case import Case, parse_case
 from ibfil.laws import Linear
 from ibfil.loads import Follower
 from ibfil.mechanics import Mechanics
-from ibfil.rods import Segmented, stack
+from ibfil.mesh import Segmented, stack
 from ibfil.simulation import Simulation
 
 # A grid small enough for tests: nodes further apart than cells, so nothing locks (numerics.md, 4.3).

@@ -7,7 +7,7 @@ import pytest
 from scenes import bare
 
 from ibfil import banded
-from ibfil.rods import Segmented
+from ibfil.mesh import Segmented
 
 TANGENT = np.array([0.0, 0.6, 0.8])
 S = np.linspace(0.0, 1.0, 11) ** 1.1

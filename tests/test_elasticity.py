@@ -10,7 +10,7 @@ from ibfil import banded
 from ibfil.elasticity import Moment, nodal_force
 from ibfil.laws import Linear, gather
 from ibfil.mechanics import Mechanics
-from ibfil.rods import Segmented, stack
+from ibfil.mesh import Segmented, stack
 from ibfil.torque_free import TorqueFree
 
 S = np.linspace(0.0, 1.0, 15) ** 1.2

@@ -16,7 +16,7 @@ import ibfil.laws
 from ibfil import banded
 from ibfil.errors import CaseError
 from ibfil.laws import DomainWalls, Field, Linear, Stiffening, TwoWell
-from ibfil.rods import Segmented, stack
+from ibfil.mesh import Segmented, stack
 from ibfil.running import run as run_case
 from ibfil.simulation import Simulation
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from ibfil.geometry import tangents
-from ibfil.rods import Mesh, Segmented, clamped_weights, stack, weights
+from ibfil.mesh import Mesh, Segmented, clamped_weights, stack, weights
 
 EPS = np.finfo(float).eps
 EVEN = np.linspace(0.0, 2.5, 12)

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from ibfil.elasticity import nodal_force
 from ibfil.geometry import Geometry
 from ibfil.mechanics import Mechanics
-from ibfil.rods import Segmented
+from ibfil.mesh import Segmented
 from ibfil.torque_free import TorqueFree
 
 A1, A2, C, EA = 1.0, 0.3, 0.7, 50.0

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from ibfil.members import Member
-from ibfil.rods import weights
+from ibfil.mesh import weights
 from ibfil.shapes import initial_shape
 
 REACH = 6  # nodes a row of the band matrices reaches to either side
