@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .frame import carry
+from .directors import carry
 
 Strains = Callable[[np.ndarray], np.ndarray]  # s (n,) -> O1, O2, O3 (n, 3)
 Formula = Callable[[np.ndarray], np.ndarray]  # s (n,) -> r (n, 3)

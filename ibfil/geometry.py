@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .frame import carried
+from .directors import carried
 from .mesh import Mesh
 from .vectors import NOT_NEGATIVE, at, cross, dot, plus, put, scaled
 

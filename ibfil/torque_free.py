@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .directors import carry
 from .elasticity import Moment
-from .frame import carry
 from .geometry import Geometry
 from .mechanics import Mechanics, TangentReversed
 from .mesh import Mesh

@@ -7,7 +7,7 @@ import pytest
 from scenes import run, scene, slopes
 from scipy.spatial.transform import Rotation
 
-from ibfil.frame import carry
+from ibfil.directors import carry
 from ibfil.mechanics import TangentReversed
 from ibfil.simulation import Simulation
 

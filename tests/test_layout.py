@@ -14,7 +14,7 @@ MODULES = {path.stem: path for path in (ROOT / "ibfil").glob("*.py")}
 
 CASE = {"case", "expressions", *(name for name in MODULES if name.startswith("case_"))}
 FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "stirring", "turns", "immersed"}
-RODS = {"mesh", "geometry", "frame", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
+RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", "observables", "fitted", "expectations"}
 LOOKING = {"show", "figure", "vtk", "vtk_data", "opened", "render", "stage", "verify", "report", "bench", "cli"}
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}

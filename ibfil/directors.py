@@ -1,4 +1,4 @@
-"""The material frame: how e1 is carried along when the tangent turns, and turned about it (Sec. 5 of the paper)."""
+"""The material frame: the director e1, carried along as the tangent turns, and turned about it (the paper, Sec. 5)."""
 
 from __future__ import annotations
 
