@@ -1,12 +1,13 @@
-"""Which unknowns of a node go through the fluid, and what becomes of those that do not.
+"""Static condensation: which unknowns of a node the fluid solves for, and how the others are eliminated before it does.
 
-Together: all of them; rods that do not twist, or whose twist stirs the grid (rotation = "grid").
-Apart: e1 turns against the rod's own drag (rotation = "local"), so turns are eliminated rod by rod and the linear
-system of the fluid keeps three unknowns a node,
+`NothingCondensed`: the fluid solves for all of them; rods that do not twist, or whose twist torques go onto the grid
+(rotation = "grid"). `TwistCondensed`: e1 turns against the rod's own drag Zr (rotation = "local"), so the turns phi are
+eliminated rod by rod, and the linear system of the fluid keeps the three displacements r of a node. With r, p the parts
+of the stiffness K and of the force g on displacements and on turns,
 
-    (Zr/tau - K_pp) dp = Zr/tau (target - phi) + g_p + K_pr dr
+    (Zr/tau - K_pp) dphi = Zr/tau (target - phi) + g_p + K_pr dr
 
-which leaves the stiffness K_rr + K_rp (Zr/tau - K_pp)^-1 K_pr on positions, and the force g_r + K_rp (..)^-1 (..).
+which leaves the stiffness K_rr + K_rp (Zr/tau - K_pp)^-1 K_pr on displacements, and the force g_r + K_rp (..)^-1 (..).
 """
 
 from __future__ import annotations
@@ -73,23 +74,23 @@ class Reduced(Protocol):
         """The moves (n, m) of all unknowns from those (c n,) of these."""
 
 
-class Turns(Protocol):
+class Condensation(Protocol):
     """Which unknowns go through the fluid; what the others do."""
 
-    def among(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
+    def held_in_fluid(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
         """Which of the held unknowns go through the fluid (bool), and where among those that do (flat)."""
 
     def reduced(self, newton: Newton) -> Reduced:
         """The statement that is left for the fluid."""
 
-    def turn(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
+    def move_rest(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
         """Writes the displacements that do not go through the fluid into y (n, m), for given forces."""
 
-    def react(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
+    def react_rest(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
         """Reactions (n, m) of supports that hold what does not go through the fluid."""
 
 
-class _All:
+class _Whole:
     """Everything goes through the fluid."""
 
     def __init__(self, newton: Newton) -> None:
@@ -109,27 +110,27 @@ class _All:
         return d.reshape(self._shape)
 
 
-class Together:
+class NothingCondensed:
     """All unknowns of a node go through the fluid."""
 
-    def among(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
+    def held_in_fluid(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
         """All of them, where they are."""
         return np.ones(held.at.size, bool), held.at
 
     def reduced(self, newton: Newton) -> Reduced:
         """The statement itself."""
-        return _All(newton)
+        return _Whole(newton)
 
-    def turn(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
+    def move_rest(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
         """Nothing is left to do."""
 
-    def react(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
+    def react_rest(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
         """None."""
         return np.zeros(felt.shape)
 
 
-class _Positions:
-    """Positions go through the fluid, the turns are eliminated."""
+class _Condensed:
+    """Displacements go through the fluid, the turns are eliminated."""
 
     def __init__(self, newton: Newton, drag: np.ndarray) -> None:
         force, held, y, tau = newton.force, newton.held, newton.y, newton.tau
@@ -188,13 +189,13 @@ class _Positions:
         return out
 
 
-class Apart:
+class TwistCondensed:
     """Turns answer to the rods' own drag (n,) against spin, times control volumes."""
 
     def __init__(self, drag: np.ndarray) -> None:
         self._drag = drag
 
-    def among(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
+    def held_in_fluid(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
         """The positions, three a node."""
         node, part = held.at // m, held.at % m
         place = part < 3
@@ -202,13 +203,13 @@ class Apart:
 
     def reduced(self, newton: Newton) -> Reduced:
         """The turns eliminated."""
-        return _Positions(newton, self._drag)
+        return _Condensed(newton, self._drag)
 
-    def turn(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
+    def move_rest(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
         """Each against its own drag."""
         y[:, 3] = target[:, 3] + tau * force[:, 3] / self._drag
 
-    def react(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
+    def react_rest(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
         """The torques of supports that hold e1."""
         out = np.zeros(felt.shape)
         at = held.at[held.at % 4 == 3] // 4

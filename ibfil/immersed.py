@@ -19,11 +19,11 @@ from typing import Protocol
 import numpy as np
 
 from . import banded
+from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
 from .fluid import Answer, Held
 from .grid import Grid
 from .kernels import Kernel
 from .mobility import TRANSLATION
-from .turns import Apart, Newton, Reduced, Together, Turns
 
 Flow = Callable[[np.ndarray, float], np.ndarray]
 
@@ -97,9 +97,9 @@ class Immersed:
     coupling: Coupling = TRANSLATION
 
     @cached_property
-    def turns(self) -> Turns:
+    def condensation(self) -> Condensation:
         """Which unknowns go through the grid, and what the others do."""
-        return Together() if self.spin_drag is None else Apart(self.spin_drag)
+        return NothingCondensed() if self.spin_drag is None else TwistCondensed(self.spin_drag)
 
     @cached_property
     def own(self) -> np.ndarray:
@@ -154,10 +154,10 @@ class ImmersedResponse(ABC):
 
     def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
         """y = target + tau (u0 + M (force + R)), R such that held unknowns move as prescribed."""
-        turns, (n, m), c = self.fluid.turns, force.shape, self.parts
+        condensation, (n, m), c = self.fluid.condensation, force.shape, self.parts
         reaction = np.zeros((n, m))
         move = self._base(target) + self.tau * self.apply(np.ascontiguousarray(force[:, :c]).ravel())
-        here, index = turns.among(held, m)
+        here, index = condensation.held_in_fluid(held, m)
         if index.size:
             columns = self.columns(index)
             push = np.linalg.solve(self.tau * columns[index], held.value[here] - move[index])
@@ -165,17 +165,17 @@ class ImmersedResponse(ABC):
             reaction[index // c, index % c] = push
         y = np.zeros((n, m))
         y[:, :c] = move.reshape(n, c)
-        turns.turn(y, force, target, self.tau)
+        condensation.move_rest(y, force, target, self.tau)
         y.ravel()[held.at] = held.value
-        reaction += turns.react(y, target, force, held, self.tau)
+        reaction += condensation.react_rest(y, target, force, held, self.tau)
         return Answer(y, force + reaction, reaction)
 
     def implicit(
         self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
     ) -> Answer:
         """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
-        turns, c = self.fluid.turns, self.parts
-        statement = turns.reduced(Newton(force, stiffness, held, y, target, self.tau))
+        condensation, c = self.fluid.condensation, self.parts
+        statement = condensation.reduced(Newton(force, stiffness, held, y, target, self.tau))
         index = statement.index
         known = np.zeros(statement.force.size)
         known[index] = statement.value
@@ -187,5 +187,5 @@ class ImmersedResponse(ABC):
         reaction[index // c, index % c] = x[index]
         move = statement.whole(d)
         felt = force + banded.multiply(stiffness, move)
-        reaction += turns.react(y + move, target, felt, held, self.tau)
+        reaction += condensation.react_rest(y + move, target, felt, held, self.tau)
         return Answer(move, felt + reaction, reaction)

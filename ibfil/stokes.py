@@ -15,11 +15,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from . import averaged, krylov, mobility
+from .condensation import Reduced, RodStiffness
 from .fluid import Memoryless
 from .grid import Grid, interpolate, project, spread
 from .immersed import Immersed, ImmersedResponse, Nodes
 from .transforms import VectorTransform
-from .turns import Reduced, RodStiffness
 
 _EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself
 _LOOSE = 1e-6  # and where it is not: less than Newton gains in an iteration by the time it stops
