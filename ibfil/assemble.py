@@ -248,7 +248,8 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     assert case.fluid.box is not None
     grid, eta = Grid(case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case)), case.fluid.viscosity
     slip = immersed.slip_mobility(case.fluid.slip, assemble_grid.kernel(case), grid, eta, stacked.spacing)
-    spin = drag(case, stacked).spin if stacked.mechanics.unknowns == 4 and not assemble_grid.stirs(case) else None
+    against = stacked.mechanics.unknowns == 4 and not assemble_grid.couples_torque(case)
+    spin = drag(case, stacked).spin if against else None
     number = np.float32 if case.fluid.precision == "single" else np.float64
     coupled, delta = assemble_grid.coupling(case, stacked), assemble_grid.kernel(case)
     made = immersed.Immersed(grid, delta, eta, slip, spin, flow(case), stacked.nodes, number, coupled)
@@ -273,8 +274,8 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
 def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Solver:
     """What evaluates velocities by FFT: of the whole grid, or where that is cheaper of the filaments' bounding box."""
     eta, threads = case.fluid.viscosity, case.compute.threads
-    if assemble_grid.stirs(case):
-        from .stirring import StirredSolve
+    if assemble_grid.couples_torque(case):
+        from .torque_coupling import StirredSolve
 
         return StirredSolve(grid, eta, threads)
     if method == "fft" or (method == "krylov" and not fills_little(case, stacked, grid)):
@@ -311,13 +312,13 @@ def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str,
     if grid is None:
         return costs.seconds_a_step(case, rods)
     cells, sizes = grid.cells.tolist(), _box(case, stacked, grid)
-    return costs.seconds_a_step(case, rods, cells, sizes, assemble_grid.stirs(case))
+    return costs.seconds_a_step(case, rods, cells, sizes, assemble_grid.parts(case))
 
 
 def _worth(case: Case, stacked: Stacked, grid: Grid) -> float:
     """What factoring the rods' own systems costs, in velocity evaluations."""
     evaluation = costs.evaluation(grid.cells.tolist(), _box(case, stacked, grid), len(stacked.s))
-    parts = 4 if assemble_grid.stirs(case) else 3
+    parts = assemble_grid.parts(case)
     return sum(costs.factored(where.stop - where.start, parts) for where in stacked.nodes) / evaluation
 
 

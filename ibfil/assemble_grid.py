@@ -57,19 +57,24 @@ def twist_radius(case: Case) -> float:
     return kernel(case).twist_radius * spacing(case) / float(np.sqrt(1.0 + case.fluid.slip))
 
 
-def stirs(case: Case) -> bool:
+def couples_torque(case: Case) -> bool:
     """Whether twist torques go onto the grid."""
     twisting = any(f.twisting is not None for f in case.filaments.values())
     return case.fluid.model != "rft" and case.fluid.rotation == "grid" and twisting
 
 
+def parts(case: Case) -> int:
+    """How many numbers of a node go through the grid (immersed.Coupling): 3, or 4 with its twist torque."""
+    return 4 if couples_torque(case) else 3
+
+
 def coupling(case: Case, stacked: Stacked) -> Coupling:
     """What of a node goes through the grid."""
-    if not stirs(case):
+    if not couples_torque(case):
         from .mobility import TRANSLATION
 
         return TRANSLATION
-    from .stirring import Stirring, own_spin
+    from .torque_coupling import TorqueCoupling, spin_mobility
 
     n, volume = len(stacked.s), stacked.mechanics.mesh.volume
     widest = twist_radius(case)
@@ -78,9 +83,9 @@ def coupling(case: Case, stacked: Stacked) -> Coupling:
         twists[where] = filament.twisting is not None
         if filament.radius is not None:
             radius[where] = alone(filament.radius, stacked.s[where])
-    spin = own_spin(radius, widest, case.fluid.slip, case.fluid.viscosity, volume)
+    spin = spin_mobility(radius, widest, case.fluid.slip, case.fluid.viscosity, volume)
     # Where a filament does not twist its turn is held; any positive number will do for the row.
-    return Stirring(np.where(twists > 0, spin, 1.0), twists)
+    return TorqueCoupling(np.where(twists > 0, spin, 1.0), twists)
 
 
 def own_mobility(case: Case, stacked: Stacked, grid: Grid) -> np.ndarray:

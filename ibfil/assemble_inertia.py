@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from . import stokes
 from .navier_stokes import FIELDS, Background, NavierStokes, Room
-from .stirring import StirredSolve
+from .torque_coupling import StirredSolve
 from .transforms import VectorTransform
 
 if TYPE_CHECKING:

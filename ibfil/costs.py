@@ -63,9 +63,9 @@ def of_rods(case: Case, nodes: int, scheme: str = "") -> float:
     return _ROUNDS[scheme or case.time.scheme] * nodes * _NODE
 
 
-def of_inertia(cells: Sequence[int], stirs: bool) -> float:
+def of_inertia(cells: Sequence[int], parts: int) -> float:
     """Seconds a step for a fluid's past and advection: components through FFTs, whatever answers to the forces."""
-    return 1.2 * (9 + 6 * (2 if stirs else 1)) / 6 * full_evaluation(cells)
+    return 1.2 * (9 + 6 * (parts - 2)) / 6 * full_evaluation(cells)
 
 
 def seconds_a_step(
@@ -73,20 +73,20 @@ def seconds_a_step(
     rods: Sequence[int],
     cells: Sequence[int] | None = None,
     sizes: Sequence[int] | None = None,
-    stirs: bool = False,
+    parts: int = 3,
 ) -> dict[str, float]:
     """Seconds of one step by each method: "rft", or on ``cells`` (3,) "table", "averaged", "fft", "pruned", "krylov".
 
-    ``rods`` are the nodes of each filament, ``sizes`` (3,) the extents of their bounding box in cells, ``stirs``
-    whether torques go onto the grid too. The table is out where it does not fit.
+    ``rods`` are the nodes of each filament, ``sizes`` (3,) the extents of their bounding box in cells, ``parts``
+    how many numbers of a node go through the grid (4: torques too). The table is out where it does not fit.
     """
     rounds, nodes = _ROUNDS[case.time.scheme], sum(rods)
     local = of_rods(case, nodes)
     if cells is None or sizes is None:
         return {"rft": local}
     if case.fluid.model == "navier-stokes":
-        return _with_inertia(case, stirs, rods, cells)
-    if stirs:
+        return _with_inertia(case, parts, rods, cells)
+    if parts == 4:
         return _with_torques(rounds, rods, cells)
     build = 0.5 * nodes**2 * _PAIR
     full = full_evaluation(cells) + nodes * _SPREAD
@@ -105,12 +105,12 @@ def seconds_a_step(
     }
 
 
-def _with_inertia(case: Case, stirs: bool, rods: Sequence[int], cells: Sequence[int]) -> dict[str, float]:
+def _with_inertia(case: Case, parts: int, rods: Sequence[int], cells: Sequence[int]) -> dict[str, float]:
     """The same with a past and advection: 15 components through FFTs a step, whatever answers to the forces."""
-    rounds, nodes, parts = _ROUNDS[case.time.scheme], sum(rods), 4 if stirs else 3
-    vectors, build = parts - 2, 0.5 * nodes**2 * _PAIR * (_COMPONENTS if stirs else 1)
+    rounds, nodes = _ROUNDS[case.time.scheme], sum(rods)
+    vectors, build = parts - 2, 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1)
     full = vectors * (full_evaluation(cells) + nodes * _SPREAD)
-    local = of_rods(case, nodes) + of_inertia(cells, stirs)
+    local = of_rods(case, nodes) + of_inertia(cells, parts)
     if case.time.scheme == "explicit":
         return {"table": local + build, "fft": local + full}
     exact = build + rounds * solved(nodes, parts)

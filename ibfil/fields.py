@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .grid import Grid, interpolate, project, spread
-from .stirring import curl, half_curl
+from .torque_coupling import curl, half_curl
 from .transforms import VectorTransform
 
 Flow = Callable[[np.ndarray, float], np.ndarray]
@@ -34,7 +34,7 @@ class GridFields:
     ) -> dict[str, np.ndarray]:
         """The fields in ``names`` that nodal forces (n, 3), or forces and torques (n, 6), drive.
 
-        The nodes have the stencils (base, weights); torques act as half a curl (stirring.py).
+        The nodes have the stencils (base, weights); torques act as half a curl (torque_coupling.py).
         """
         # Each field is transformed in the same room, so what they are made of is kept elsewhere.
         modes = self._modes(base, weights, force[:, :3])

@@ -141,7 +141,7 @@ def _of_images(simulation: Simulation, key: str, name: str) -> list[str]:
 def _of_spin(simulation: Simulation, key: str, filament) -> list[str]:
     """A rod that is thicker than what the grid can make spin."""
     case = simulation.case
-    if not assemble_grid.stirs(case) or filament.twisting is None or filament.radius is None:
+    if not assemble_grid.couples_torque(case) or filament.twisting is None or filament.radius is None:
         return []
     widest = assemble_grid.twist_radius(case)
     largest = float(np.max(filament.radius.bind("s", "t")(np.linspace(0.0, filament.length, 11), 0.0)))

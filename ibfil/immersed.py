@@ -5,7 +5,7 @@
 S spreads nodal forces with a discrete delta kernel, L^-1 is the fluid's solve, J interpolates back (S transposed, times
 the cell's volume), s is the slip mobility that keeps nearly inextensible rods from locking when their nodes are closer
 than the grid (numerics.md, 4.3). What of a node goes through the fluid is told by its coupling: forces and velocities
-(mobility.py), or torques and spins with them (stirring.py). Reactions of supports are spread like any other force.
+(mobility.py), or torques and spins with them (torque_coupling.py). Reactions of supports are spread like any force.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
-from . import __version__, mobility, stirring
+from . import __version__, mobility, torque_coupling
 from .grid import Grid
 from .immersed import slip_mobility
 from .kernels import KERNELS
@@ -113,21 +113,21 @@ def measure(rod: Rod) -> Match:
 
 
 def _spin(rod: Rod, grid: Grid) -> tuple[float, float]:
-    """The drag against spin, from the torques that turn all nodes at unit rate (stirring.py), and its scatter."""
+    """The drag against spin, from torques that turn all nodes at unit rate (torque_coupling.py), and its scatter."""
     kernel, ds = KERNELS[rod.kernel], rod.length / (rod.nodes - 1)
     volume = np.full(rod.nodes, ds)
     volume[[0, -1]] *= 0.5
     own = np.zeros((rod.nodes, 4))
     widest = kernel.twist_radius * grid.spacing / math.sqrt(1.0 + rod.slip)
-    own[:, 3] = stirring.own_spin(np.full(rod.nodes, rod.radius), widest, rod.slip, 1.0, volume)
-    response = [mobility.point_response(grid, 1.0), stirring.torque_response(grid, 1.0)]
+    own[:, 3] = torque_coupling.spin_mobility(np.full(rod.nodes, rod.radius), widest, rod.slip, 1.0, volume)
+    response = [mobility.point_response(grid, 1.0), torque_coupling.torque_response(grid, 1.0)]
     table = mobility.octant(np.concatenate(response), kernel.points)
     s = np.linspace(-0.5 * rod.length, 0.5 * rod.length, rod.nodes)[:, None]
     drags, weights = [], []
     for weight, frame in directions():
         for place in places(PLACES):
             base, phi = kernel.stencil(grid.coordinates(s * frame[0] + place * grid.spacing))
-            whole = stirring.mobility(table, grid.cells, base, phi, np.tile(frame[0], (rod.nodes, 1)), own)
+            whole = torque_coupling.mobility(table, grid.cells, base, phi, np.tile(frame[0], (rod.nodes, 1)), own)
             drags.append(_against(whole[:, 3, :, 3]))
             weights.append(weight)
     return _mean(np.array(drags) / rod.length, np.array(weights))

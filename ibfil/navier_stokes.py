@@ -22,8 +22,8 @@ from .grid import Grid, interpolate
 from .immersed import Flow, Immersed, ImmersedResponse, Nodes
 from .past import Past, Weights, weights
 from .slab import Slab
-from .stirring import half_curl
 from .stokes import Tabulated
+from .torque_coupling import half_curl
 from .transforms import VectorTransform
 
 SAME = 1e-9  # steps that differ by less, as the differences of rounded times do, share their operator
@@ -56,7 +56,7 @@ class Background:
 class Room:
     """Where fields are transformed; what it holds does not outlive a call, so others may use it too.
 
-    ``flow`` has FIELDS components. ``spin`` is there where nodes stir the fluid (stirring.py).
+    ``flow`` has FIELDS components. ``spin`` is there where nodes stir the fluid (torque_coupling.py).
     """
 
     def __init__(self, flow: VectorTransform, spin: VectorTransform | None, grid: Grid, threads: int = 1) -> None:

@@ -74,8 +74,8 @@ def modelled(case: Case) -> list[str]:
         terms += [word for key, word in _LOADS.items() if getattr(f.loads, key, None) is not None]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     if case.fluid.flow is not None:
-        spins = "and spins them by half its vorticity" if assemble_grid.stirs(case) else "and does not spin them"
-        out.append(f"a background flow, which moves the nodes {spins}")
+        spins = "spins them by half its vorticity" if assemble_grid.couples_torque(case) else "does not spin them"
+        out.append(f"a background flow, which moves the nodes and {spins}")
     if case.contact is not None:
         out.append(_contact(case.contact))
     fluid = case.fluid
@@ -92,7 +92,7 @@ def modelled(case: Case) -> list[str]:
         out.append("Stokes flow on a periodic grid: hydrodynamic interaction of all nodes and their images")
     if fluid.slip:
         out.append(f"slip mobility of {fluid.slip:g} of a point's own, against locking")
-    if assemble_grid.stirs(case):
+    if assemble_grid.couples_torque(case):
         out.append("twist torques stir the grid as half a curl, rods spin with half its vorticity (rotation = grid)")
     elif any(f.twisting is not None for f in case.filaments.values()):
         out.append("spin against the rod's own drag (rotation = local)")
@@ -122,7 +122,7 @@ def absent(case: Case) -> list[str]:
         out.append("twist: no twist unknowns; e1 is carried along")
     if case.fluid.model == "rft":
         out.append("hydrodynamic interaction; grid and FFT plans")
-    elif not assemble_grid.stirs(case):
+    elif not assemble_grid.couples_torque(case):
         out.append("torque coupling of the spin to the grid")
     if case.output.grid_every is None:
         out.append("field output")
@@ -161,7 +161,7 @@ def memory(simulation: Simulation) -> dict[str, float]:
     from .kernels import KERNELS
 
     cells = simulation.grid.cells
-    rim, parts = KERNELS[case.fluid.kernel].points - 1, 4 if assemble_grid.stirs(case) else 3
+    rim, parts = KERNELS[case.fluid.kernel].points - 1, assemble_grid.parts(case)
     number = 4.0 if case.fluid.precision == "single" else 8.0
     out["mobility table"] = number * (15 if parts == 4 else 6) * float(np.prod(cells // 2 + 1 + 2 * rim))
     if simulation.method == "averaged":

@@ -57,14 +57,14 @@ def _of_grid(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
     seconds = simulation.method_seconds[simulation.method] - costs.of_rods(case, len(simulation.arclength))
     fields, used = memory.get(_FIELDS, 0.0), {k: v for k, v in memory.items() if k not in ("band matrix", _FIELDS)}
     if case.fluid.model == "navier-stokes":
-        past = min(seconds, costs.of_inertia(cells, assemble_grid.stirs(case)))
+        past = min(seconds, costs.of_inertia(cells, assemble_grid.parts(case)))
         held = sum(size for name, size in used.items() if "past" in name or "transforms" in name)
         out.append(Term("inertia and advection", past, held))
         seconds, used = seconds - past, {"rest": sum(used.values()) - held}
     puts_out = case.output.grid_every is not None
     size = sum(used.values()) + (0.0 if puts_out else fields)
-    stirring = ", torques too" if assemble_grid.stirs(case) else ""
-    out.insert(0, Term(f"flow between nodes{stirring} ({simulation.method})", seconds, size))
+    torques = ", torques too" if assemble_grid.couples_torque(case) else ""
+    out.insert(0, Term(f"flow between nodes{torques} ({simulation.method})", seconds, size))
     look, step = costs.full_evaluation(cells), simulation.step_length
     if case.output.grid_every is not None:
         out.append(Term("fields put out", len(case.output.fields) * look * step / case.output.grid_every, fields))

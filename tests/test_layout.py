@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
 MODULES = {path.stem: path for path in (ROOT / "ibfil").glob("*.py")}
 
 CASE = {"case", "expressions", *(name for name in MODULES if name.startswith("case_"))}
-FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "stirring", "condensation", "immersed"}
+FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "torque_coupling", "condensation", "immersed"}
 RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", "observables", "fitted", "expectations"}
 LOOKING = {"show", "figure", "vtk", "vtk_data", "opened", "render", "stage", "verify", "report", "bench", "cli"}

@@ -20,8 +20,8 @@ from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import FIELDS, Background, NavierStokes, Room
 from ibfil.simulation import Simulation
 from ibfil.stepping import NotConverged
-from ibfil.stirring import StirredSolve, Stirring
 from ibfil.stokes import StokesByTable
+from ibfil.torque_coupling import StirredSolve, TorqueCoupling
 from ibfil.transforms import VectorTransform
 
 NOTHING = Held(np.zeros(0, np.int64), np.zeros(0))
@@ -430,7 +430,7 @@ def test_hardly_any_inertia_is_stokes_flow_on_the_papers_grid():
 def stirred() -> tuple[NavierStokes, Nodes]:
     """A fluid with one node that stirs it, and the node."""
     grid, axis = Grid([2 * np.pi] * 3, [16] * 3), np.array([[0.6, 0.0, 0.8]])
-    made = Immersed(grid, KERNELS["peskin4"], 0.3, np.zeros(1), None, coupling=Stirring(np.zeros(1), np.ones(1)))
+    made = Immersed(grid, KERNELS["peskin4"], 0.3, np.zeros(1), None, coupling=TorqueCoupling(np.zeros(1), np.ones(1)))
     room = Room(VectorTransform((16, 16, 16), fields=FIELDS), VectorTransform((16, 16, 16)), grid)
     return NavierStokes(made, 2.0, lambda alpha: StokesByTable(made, alpha), room), made.nodes(FAR, axis)
 

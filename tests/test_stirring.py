@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ibfil import mobility, stirring
+from ibfil import mobility, torque_coupling
 from ibfil.fields import GridFields
 from ibfil.fluid import Held
 from ibfil.grid import Grid, interpolate, spread
 from ibfil.immersed import Immersed
 from ibfil.kernels import KERNELS
-from ibfil.stirring import StirredSolve, Stirring
 from ibfil.stokes import StokesByFFT, StokesByTable, StokesSolve
+from ibfil.torque_coupling import StirredSolve, TorqueCoupling
 
 KERNEL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 H = 0.1
@@ -37,7 +37,7 @@ def scattered(cells: tuple[int, int, int], count: int, seed: int) -> np.ndarray:
 def immersed(kernel, cells, count: int, eta: float = 1.3, slip: float = 0.02, seed: int = 9) -> Immersed:
     rng = np.random.default_rng(seed)
     grid = Grid([n * H for n in cells], cells)
-    coupling = Stirring(rng.uniform(0, 5, count), np.where(np.arange(count) % 5 == 4, 0.0, 1.0))
+    coupling = TorqueCoupling(rng.uniform(0, 5, count), np.where(np.arange(count) % 5 == 4, 0.0, 1.0))
     return Immersed(grid, kernel, eta, np.full(count, slip), None, coupling=coupling)
 
 
@@ -98,7 +98,7 @@ def test_spreading_half_a_curl_is_adjoint_to_interpolating_half_the_vorticity():
     def half_curl(v: np.ndarray) -> np.ndarray:
         modes = np.fft.rfftn(v, axes=(1, 2, 3))
         out = np.zeros_like(modes)
-        stirring.half_curl(modes, *k, out)
+        torque_coupling.half_curl(modes, *k, out)
         return np.fft.irfftn(out, s=cells, axes=(1, 2, 3))
 
     given = np.zeros((3, *cells))

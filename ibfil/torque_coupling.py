@@ -1,4 +1,4 @@
-"""rotation = "grid": rods that stir the fluid as they turn, and are turned by its vorticity.
+"""rotation = "grid": twist torques act on the fluid of the grid, and its vorticity turns the rods.
 
 The generalised immersed boundary of Lim, Ferent, Wang & Peskin 2008 (SIAM J. Sci. Comput. 31, 273): a node gives the
 fluid its force and, as half a curl, its twist torque; it moves with the velocity and spins with half the vorticity,
@@ -181,7 +181,7 @@ class StirredSolve:
         return np.hstack([interpolate(base, weights, t.backward()) for t in (self._flow, self._spin)])
 
 
-def own_spin(radius: np.ndarray, widest: float, slip: float, viscosity: float, volume: np.ndarray) -> np.ndarray:
+def spin_mobility(radius: np.ndarray, widest: float, slip: float, viscosity: float, volume: np.ndarray) -> np.ndarray:
     """c (n,): the spin per torque that rods of ``radius`` (n,) have beyond the grid's, of which ``slip`` at least.
 
     ``widest`` is b/sqrt(1 + slip), the largest radius that a rod has when it spins, ``volume`` (n,) control volumes.
@@ -190,7 +190,7 @@ def own_spin(radius: np.ndarray, widest: float, slip: float, viscosity: float, v
     return inside / (4 * np.pi * viscosity * volume)
 
 
-class Stirring:
+class TorqueCoupling:
     """Torques and spins go through the grid with forces and velocities (immersed.Coupling): four numbers a node.
 
     ``spin`` (n,) is what a node spins per torque beyond the grid's answer, ``twists`` (n,) is one where the rod twists
