@@ -11,6 +11,8 @@ F at contact, zero at the range D beyond it, on the four end nodes by the lever 
 the whole. Where nodes are closer than D the weight makes it a force per length of either rod, and finely divided rods
 that cross at right angles repel with F when they touch and 1.2 F at the most, whatever their nodes. Coarser ones do
 with F to 4 F, most at a node. A larger load would press them through each other, and such a step is not taken.
+
+Which segments are near each other is found by contact_search.py.
 """
 
 from __future__ import annotations
@@ -21,9 +23,9 @@ import numpy as np
 from numba import njit
 
 from .along import alone
+from .contact_search import Pairs, Segments, closest, search
 from .errors import CaseError, Stopped
 from .geometry import Geometry
-from .segments import Pairs, Segments, closest, search
 from .stepping import NotConverged, State
 from .variation import Variation
 

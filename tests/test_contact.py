@@ -169,11 +169,11 @@ def test_nothing_of_contact_is_loaded_without_it(tmp_path, contact, loaded):
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from ibfil.cli import main\n"
         "assert main(['run', 'rod.toml']) == 0\n"
-        "print('loaded:', {'ibfil.contact', 'ibfil.segments'} & set(sys.modules))"
+        "print('loaded:', {'ibfil.contact', 'ibfil.contact_search'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert ("ibfil.contact" in done.stdout) == loaded
-    assert ("ibfil.segments" in done.stdout) == loaded
+    assert ("ibfil.contact_search" in done.stdout) == loaded
 
 
 def test_without_it_there_is_nothing_of_it_in_the_results():

@@ -8,8 +8,8 @@ from contact_scenes import GRID, case, crossed, ran
 from test_segments import suspension
 
 from ibfil.contact import Contact
+from ibfil.contact_search import Segments
 from ibfil.errors import RunFailed
-from ibfil.segments import Segments
 from ibfil.simulation import Simulation
 
 

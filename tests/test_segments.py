@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from ibfil.segments import Segments, closest, search
+from ibfil.contact_search import Segments, closest, search
 
 OPEN = np.zeros(3)
 
