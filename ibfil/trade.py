@@ -104,13 +104,20 @@ def trade(
     asked = _measures(base, observe)
     nodes = any(key.rsplit(".", 1)[-1] in _SPACE for one in axes for key in one.keys)
 
-    def run(some: Sequence[Member], where: Path) -> list[Outcome]:
-        return run_members(some, where, jobs=jobs, executor=executor, say=say)
-
     with _budget(budget) as left:
+
+        def heed(line: str = "") -> None:
+            """End it also where the interrupt was lost: one that comes while the garbage collector calls back."""
+            if line:
+                say(line)
+            if left():
+                raise Interrupted
+
+        def run(some: Sequence[Member], where: Path) -> list[Outcome]:
+            return run_members(some, where, jobs=jobs, executor=executor, say=heed)
+
         reference = prove(case, overrides, folder, asked, nodes, run)
-        if left():  # the interrupt itself is lost where it comes while the garbage collector calls back
-            raise Interrupted
+        heed()
         measures = _proved(reference, asked, say)
         _rounds(members, folder / "runs", repeat, run, left, say)
     tried = tuple(_tried(one, folder / "runs", repeat, clock, reference, measures) for one in settings)

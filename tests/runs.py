@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -151,8 +152,10 @@ def interrupted(path: Path, step: int, given=None, build=FakeSimulation) -> None
         run(given or case(), path, build=signalling(build, step))
 
 
-def wait_for(condition, seconds: float = 30.0) -> None:
+def wait_for(condition, process: subprocess.Popen | None = None, seconds: float = 300.0) -> None:
+    """Until ``condition`` holds, at once in vain where ``process``, which is to bring it about, has ended."""
     end = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < end
+        assert process is None or process.poll() is None or condition(), "the process has ended"
+        assert time.monotonic() < end, f"not within {seconds:g} s"
         time.sleep(0.005)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from made_run import BENT, make_run
+from runs import wait_for
 
 from ibfil import cli, shipped
 from ibfil.record import RunFile
@@ -88,8 +89,7 @@ sys.exit(main(sys.argv[1:]))
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_run_that_goes_on_has_the_threads_it_began_with(here):
-    killed_at_its_end(here, "compute.threads=2")
+def test_a_run_that_goes_on_has_the_threads_it_began_with(cut_here):
     assert cli._threads_of("bent.h5") == 2
     assert cli._threads_of("nothing.h5") == 1
 
@@ -188,23 +188,33 @@ def test_a_run_that_diverges(here, capsys):
         assert len(run) >= 1
 
 
-def killed_at_its_end(here: Path, *changes: str) -> str:
-    """Start a long run, press Ctrl-C once its first outputs are there; what it said to standard error."""
-    command = [sys.executable, "-m", "ibfil", "run", "bent.toml", "time.end=1e4", "output.every=0.5", *changes]
+@pytest.fixture(scope="module")
+def cut(tmp_path_factory) -> tuple[Path, str]:
+    """A long run on two threads that was ended by Ctrl-C: its folder, what it said to standard error."""
+    folder = tmp_path_factory.mktemp("cut")
+    (folder / "bent.toml").write_text(BENT)
+    long = ["bent.toml", "time.end=1e4", "output.every=0.5", "compute.threads=2"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
-    deadline = time.monotonic() + 120
-    while not (here / "bent.ckpt.h5").exists() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.02)
-    time.sleep(0.2)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "ibfil", "run", *long], stderr=subprocess.PIPE, text=True, env=environment, cwd=folder
+    )
+    wait_for((folder / "bent.ckpt.h5").exists, process)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=300)
     assert process.returncode == 130, err
-    return err
+    return folder, err
 
 
-def test_ctrl_c_says_how_to_go_on_and_that_works(here):
-    err = killed_at_its_end(here)
+@pytest.fixture
+def cut_here(here, cut) -> str:
+    """That run in the folder we are in; what it said."""
+    for file in cut[0].iterdir():
+        shutil.copy(file, here)
+    return cut[1]
+
+
+def test_ctrl_c_says_how_to_go_on_and_that_works(here, cut_here):
+    err = cut_here
     assert "Traceback" not in err
     (line,) = (line for line in err.splitlines() if "interrupted" in line)
     words = line.split("go on with: ibfil ")[1].split()
@@ -220,8 +230,7 @@ def test_ctrl_c_says_how_to_go_on_and_that_works(here):
     assert not (here / "bent.ckpt.h5").exists()
 
 
-def test_a_change_that_may_not_be_made_on_the_way(here, capsys):
-    killed_at_its_end(here)
+def test_a_change_that_may_not_be_made_on_the_way(cut_here, capsys):
     assert cli.main(["run", "--resume", "bent.h5", "fluid.viscosity=2"]) == 2
     assert "fluid.viscosity" in capsys.readouterr().err
 

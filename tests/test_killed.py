@@ -7,8 +7,9 @@ import random
 import signal
 import subprocess
 import sys
-import time
+from contextlib import suppress
 from pathlib import Path
+from time import sleep
 
 import h5py
 import numpy as np
@@ -32,8 +33,8 @@ def killed_over_and_over(path: Path, kills: int, seed: int) -> int:
         )
         if done < kills:
             while victim.poll() is None and not journal_path(path).exists():  # until it has got to writing
-                time.sleep(0.005)
-            time.sleep(rng.uniform(0.0, 0.25))
+                sleep(0.005)
+            sleep(rng.uniform(0.0, 0.25))
             victim.kill()
             assert victim.wait() in (0, -signal.SIGKILL)
             done += victim.returncode != 0
@@ -41,7 +42,7 @@ def killed_over_and_over(path: Path, kills: int, seed: int) -> int:
             if what == "start" and path.exists():
                 path.unlink()
         else:
-            assert victim.wait(60) == 0
+            assert victim.wait(300) == 0
             return done
 
 
@@ -58,7 +59,8 @@ def test_a_fluid_with_a_past_goes_on_after_kill_as_if_never_killed(tmp_path):
     changes = [*short, "output.checkpoint_every=1e-9"]
     subprocess.run([*command, case_file, *changes, "-o", whole], env=env, check=True, capture_output=True)
     victim = subprocess.Popen([*command, case_file, *changes, "-o", killed], env=env, stdout=subprocess.DEVNULL)
-    wait_for(lambda: checkpoint_path(killed).exists() and checkpoint.read(checkpoint_path(killed)).steps > 2, 120.0)
+    at = checkpoint_path(killed)
+    wait_for(lambda: at.exists() and checkpoint.read(at).steps > 2, victim)
     victim.kill()
     assert victim.wait() == -signal.SIGKILL
     subprocess.run([*command, "--resume", killed], env=env, check=True, capture_output=True)
@@ -164,33 +166,51 @@ def test_outputs_after_the_checkpoint_are_cut_and_made_again(path, uncut):
 
 
 def test_the_file_can_be_read_while_it_is_written(path, uncut):
-    """By h5py in another process than the writer, at any time, the outputs so far whole and right."""
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; from fake_simulation import *; from ibfil import recorder, running\n"
-        "recorder._PAUSE = recorder._SHARE = 0\n"
-        "build = lambda *given: FakeSimulation(*given, pause=0.003)\n"
-        "running.run(case('', 'output.checkpoint_every=1000'), sys.argv[1], build=build, progress=False)"
-    )
+    """By h5py in another process than the writer, at any time, the outputs so far whole and right.
+
+    The writer takes a line of its input for an output, so that however slow the reader is, it sees many states of
+    the file; and it writes on while it is looked at.
+    """
+    code = """
+import sys; sys.path[:0] = sys.argv[2:]
+from fake_simulation import *
+from ibfil import loop, recorder, running
+loop._LOOK = recorder._PAUSE = recorder._SHARE = 0
+class Paced(FakeSimulation):
+    def frame(self, *fields):
+        sys.stdin.readline()
+        return super().frame(*fields)
+build = lambda *given: Paced(*given, pause=0.001)
+running.run(case("", "output.checkpoint_every=1000"), sys.argv[1], build=build, progress=False, log=id)
+"""
     with h5py.File(uncut) as file:
         expected = file["filaments/rod/position"][()]
-    writer = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent], stdout=subprocess.DEVNULL)
-    lengths, failures = [], 0
+    writer = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent], stdin=subprocess.PIPE, bufsize=0)
+    lengths = []
+
+    def plain() -> bool:
+        """Whether h5py alone can read it: not in the midst of a write, but then soon after."""
+        try:
+            with h5py.File(path, "r", locking=False) as file:
+                assert np.array_equal(file["filaments/rod/e1"][0], 4 * expected[0])
+        except OSError:
+            return False
+        return True
+
     try:
-        wait_for(checkpoint_path(path).exists)
+        writer.stdin.write(b"\n")
+        wait_for(checkpoint_path(path).exists, writer)
         while writer.poll() is None:
+            with suppress(BrokenPipeError):  # it has ended since
+                writer.stdin.write(b"\n")
             with RunFile(path) as file:
                 status, position = file.status, file.position()
             assert status in ("running", "finished")
             assert np.array_equal(position, expected[: len(position)])
             lengths.append(len(position))
-            try:
-                with h5py.File(path, "r", locking=False) as plain:
-                    assert np.array_equal(plain["filaments/rod/e1"][0], 4 * expected[0])
-            except OSError:
-                failures += 1  # h5py alone may come in the midst of a write
+            wait_for(plain)
     finally:
         writer.kill()
-        writer.wait()
-    assert len(set(lengths)) > 5
+        writer.communicate()
     assert lengths == sorted(lengths)
-    assert failures < 0.05 * len(lengths) + 1
+    assert len(set(lengths)) > 10  # of 21

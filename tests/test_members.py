@@ -130,13 +130,20 @@ def test_any_executor_can_be_handed_in(tmp_path, said):
     assert work(GOOD, str(tmp_path)).seconds == 0  # and again does nothing
 
 
-LONG = ("time.end=4", "output.every=0.5", "output.checkpoint_every=1e-3")
+LONG = ("time.end=0.05", "output.every=0.01")
 SCRIPT = f"""
-import sys
+import sys, time
 sys.path[:0] = {[str(ROOT), str(ROOT / "tests")]!r}
+from ibfil import loop
 from ibfil.errors import Interrupted
 from ibfil.members import Member, run_members
 from made_run import BENT
+class Waiting(loop.Loop):  # here and in each worker, which reads this script: a run waits in a step for the signal
+    def _after_step(self):
+        while not self._signals.caught:
+            time.sleep(0.01)
+        super()._after_step()
+loop.Loop = Waiting
 if __name__ == "__main__":
     many = [Member(name, BENT, {LONG!r}) for name in ("one", "two", "three")]
     try:
@@ -155,16 +162,16 @@ def test_after_a_signal_everything_can_be_gone_on_with(tmp_path, jobs, said):
     command = [sys.executable, "study.py", str(folder), str(jobs)]
     study = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, start_new_session=True)
     begun = [folder / f"{name}.h5" for name in ("one", "two")[:jobs]]
-    wait_for(lambda: all(checkpoint_path(path).exists() for path in begun), 120)
+    wait_for(lambda: all(checkpoint_path(path).exists() for path in begun), study)
     os.killpg(study.pid, signal.SIGINT)  # as Ctrl-C does
-    out, _ = study.communicate(timeout=60)
+    out, _ = study.communicate(timeout=300)
     assert study.returncode == 130, out
     assert "interrupted; 0 of 3 runs are done" in out
     assert sorted(folder.glob("*.h5")) == sorted([*begun, *map(checkpoint_path, begun)])
     with RunFile(begun[0]) as file:
         assert file.status == "interrupted"
         created = file.created
-    (outcome,) = run_members([Member("one", BENT, (*LONG[:-1], "output.checkpoint_every=60"))], folder, say=said.append)
+    (outcome,) = run_members([Member("one", BENT, LONG)], folder, say=said.append)
     assert outcome.status == "finished"
     with RunFile(outcome.path) as file:
         assert file.created == created  # gone on with, not begun anew

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from fake_simulation import FakeSimulation, case
-from runs import HERE, SCENES, content, go_on, interrupted, run, signalling, wait_for
+from runs import HERE, SCENES, content, go_on, interrupted, run, signalling
 
 from ibfil import checkpoint
 from ibfil.errors import CaseError, Interrupted
@@ -56,22 +56,30 @@ def test_an_interrupted_run_without_a_file_says_so():
 
 
 def test_a_second_ctrl_c_kills(path):
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; from fake_simulation import *; from ibfil import running\n"
-        "build = lambda *given: FakeSimulation(*given, pause=60)\n"
-        "running.run(case(), sys.argv[1], build=build, progress=False)"
-    )
-    victim = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent])
+    """The first one only leaves word, and the step goes on; by then the second one ends the process."""
+    code = """
+import signal, sys, time; sys.path[:0] = sys.argv[2:]
+from fake_simulation import *
+from ibfil import running
+class Endless(FakeSimulation):
+    def advance(self, until, after_step):
+        print("in a step", flush=True)
+        while signal.getsignal(signal.SIGINT) is not signal.SIG_DFL:
+            time.sleep(0.01)
+        print("still in it", flush=True)
+        time.sleep(1e4)
+running.run(case(), sys.argv[1], build=Endless, progress=False, log=id)
+"""
+    command = [sys.executable, "-c", code, path, HERE, HERE.parent]
+    victim = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
-        wait_for(checkpoint_path(path).exists)
-        victim.send_signal(signal.SIGINT)
-        with pytest.raises(subprocess.TimeoutExpired):  # a step is taken to its end
-            victim.wait(0.5)
-        victim.send_signal(signal.SIGINT)
-        assert victim.wait(10) == -signal.SIGINT
+        for told in ("in a step\n", "still in it\n"):
+            assert victim.stdout.readline() == told
+            victim.send_signal(signal.SIGINT)
+        assert victim.wait(300) == -signal.SIGINT
     finally:
         victim.kill()
-        victim.wait()
+        victim.communicate()
 
 
 def test_other_versions_are_told(path):

@@ -158,6 +158,18 @@ def test_the_budget_ends_it_and_the_same_call_goes_on(tmp_path):
     assert [one.status for one in made.tried] == ["finished", "finished"]
 
 
+def test_a_budget_whose_interrupt_is_lost_ends_with_the_run_under_way(tmp_path, monkeypatch):
+    """As where it comes while the garbage collector calls back: no KeyboardInterrupt is raised at all."""
+    monkeypatch.setattr("os.kill", lambda process, number: None)
+
+    def ring(line: str) -> None:
+        if line.startswith("step=1e-3.1: finished"):
+            signal.raise_signal(signal.SIGALRM)
+
+    made = trade(BENT, [axis("time.step=1e-3,5e-4")], tmp_path, repeat=1, budget=1e6, observe=["position"], say=ring)
+    assert [one.status for one in made.tried] == ["finished", "left out"]
+
+
 def test_what_the_reference_cannot_tell_is_marked_and_counts_against_a_setting(tmp_path):
     made = trade(BENT, [axis("time.step=1e-3,1.25e-4")], tmp_path, repeat=1, say=quiet, observe=["position"])
     coarse, fine = made.tried

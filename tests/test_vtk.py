@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -192,20 +193,37 @@ def test_outputs_that_were_cut_back_are_replaced(tmp_path):
 
 
 def test_watching_follows_a_run_to_its_end(tmp_path):
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; from fake_simulation import *; from ibfil import recorder, running\n"
-        "recorder._PAUSE = recorder._SHARE = 0\n"
-        "build = lambda *given: FakeSimulation(*given, pause=0.005)\n"
-        "running.run(case(), sys.argv[1], build=build, progress=False)"
-    )
+    """The run waits with its next outputs for the collection to be there, and twice for its last ones to be told of."""
+    code = """
+import sys; sys.path[:0] = sys.argv[2:]
+from pathlib import Path
+from fake_simulation import *
+from ibfil import loop, recorder, running
+loop._LOOK = recorder._PAUSE = recorder._SHARE = 0
+class Paced(FakeSimulation):
+    def advance(self, until, after_step):
+        super().advance(until, after_step)
+        while not Path("out/run.pvd").exists():
+            clock.sleep(0.01)
+        if until in (0.4, 0.8):
+            sys.stdin.readline()
+running.run(case(), sys.argv[1], build=Paced, progress=False, log=id)
+"""
     path, said = tmp_path / "run.h5", []
-    writer = subprocess.Popen([sys.executable, "-c", code, path, HERE, HERE.parent], stdout=subprocess.DEVNULL)
+    command = [sys.executable, "-c", code, path, HERE, HERE.parent]
+    writer = subprocess.Popen(command, stdin=subprocess.PIPE, bufsize=0, cwd=tmp_path)
+
+    def told(line: str) -> None:
+        said.append(line)
+        with suppress(BrokenPipeError):  # it has ended
+            writer.stdin.write(b"\n")
+
     try:
-        wait_for(checkpoint_path(path).exists)
-        collection = vtk.write_vtk(path, tmp_path / "out", watch=0.05, log=said.append)
+        wait_for(checkpoint_path(path).exists, writer)
+        collection = vtk.write_vtk(path, tmp_path / "out", watch=0.05, log=told)
     finally:
         writer.kill()
-        writer.wait()
+        writer.communicate()
     with RunFile(path) as run:
         assert run.status == "finished"
         assert pyvista.PVDReader(str(collection)).time_values == run.time.tolist()
