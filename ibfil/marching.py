@@ -13,6 +13,10 @@ import numpy as np
 
 from .stepping import FAILURES, State, Step
 
+HELD = 1.3  # a step is kept unless one longer by this would do
+MARGIN = 1.1  # what the fluid's own motion may gain before a step it limits changes
+SAFETY = 0.9  # of the step that would err as much as is allowed
+
 
 class Walker(Protocol):
     """What a march asks of a simulation."""
@@ -125,9 +129,11 @@ class ControlledSteps:
     much shorter than anything the scene drives may err as much as one of that length: the few steps through a stiff
     start, where the nodes settle by a millionth of the length, need not be resolved to a fraction of that.
 
-    A step whose error is above tolerance times dt is rejected, the whole of it, and repeated shorter. A step grows by
-    two at the most (BDF2 is stable below 2.41). Three rejections in a row, as at a jump in what drives the rods, start
-    again from an Euler step.
+    A step whose error is above tolerance times dt is rejected, the whole of it, and repeated shorter. Steps are held:
+    equal parts of the time to the next output, until one HELD times as long would do (codes for stiff equations do so:
+    VODE, Brown, Byrne & Hindmarsh 1989). A fluid with inertia has its operator made anew for each new length, and what
+    is known of equal steps' error holds best for more of them. A step grows by two at the most (BDF2 is stable below
+    2.41). Three rejections in a row, as at a jump in what drives the rods, start again from an Euler step.
     """
 
     def __init__(self, tolerance: float, rate: float, longest: float, order: int, size: float) -> None:
@@ -148,9 +154,10 @@ class ControlledSteps:
         rejected = 0
         while True:
             rest = until - walker.time
-            self.length = min(self.length, walker.longest_step())
+            if self.length > walker.longest_step():
+                self.length = walker.longest_step() / MARGIN
             parts = max(1, int(np.ceil(rest / self.length * (1 - 1e-9))))
-            dt = rest if parts == 1 else min(self.length, rest / 2) if parts == 2 else self.length
+            dt = rest / parts
             try:
                 step = walker.attempt(dt)
                 error = self._error(walker.state_now, step, dt) / (self._size * max(dt, 0.01 / self._rate))
@@ -165,16 +172,17 @@ class ControlledSteps:
             if not walker.may_halve(dt):
                 walker.give_up("the error stays above time.tolerance", dt)
             if np.isfinite(error):
-                self.length = dt * max(0.2, 0.8 * (self.tolerance / error) ** (1.0 / self._power(walker)))
+                self.length = dt * max(0.2, SAFETY * (self.tolerance / error) ** (1.0 / self._power(walker)))
             if rejected == 3:
                 walker.state_now = walker.state_now._replace(dt_old=0.0)
                 self._before = []
         state = walker.state_now
-        growth = 0.9 * (self.tolerance / max(error, 1e-300)) ** (1.0 / self._power(walker))
+        growth = SAFETY * (self.tolerance / max(error, 1e-300)) ** (1.0 / self._power(walker))
         self._before = [(state.dt_old, state.y_old)] if state.dt_old > 0 else []
-        walker.accept(step, until if dt == rest else walker.time + dt)
-        if dt == self.length or growth < 1.0:
-            self.length = min(self._longest, dt * min(2.0, max(0.3, growth)))
+        walker.accept(step, until if parts == 1 else walker.time + dt)
+        length = min(dt * min(2.0, growth), walker.longest_step() / MARGIN, self._longest)
+        if length > HELD * self.length:
+            self.length = length
 
     def _power(self, walker: Walker) -> int:
         """The order of the error a unit time: 2 for BDF2, 1 for Euler."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ibfil import mobility
 from ibfil.case import parse_case
 from ibfil.errors import RunFailed
 from ibfil.simulation import Simulation
@@ -137,6 +138,56 @@ def test_equal_steps_are_never_longer_than_asked():
     lengths = np.diff(times)
     assert len(lengths) == 8
     assert np.allclose(lengths, 0.05 / 8, rtol=1e-12)
+
+
+NAVIER_STOKES = """
+[fluid]
+model = "navier-stokes"
+viscosity = 1.0
+density = 10.0
+box = [1.6, 1.6, 1.6]
+cells = [32, 32, 32]
+[time]
+end = 1.0
+tolerance = {tolerance}
+[output]
+every = 0.05
+"""
+
+
+def _in_a_heavy_fluid(tolerance, end=0.6):
+    """Positions at each output of the swimmer of 21 nodes, and the lengths of the steps."""
+    rod = SWIMMER.replace("nodes = 41", "nodes = 21")
+    simulation = Simulation(parse_case(rod + NAVIER_STOKES.format(tolerance=tolerance), "test.toml"))
+    found, lengths = [], []
+    for k in range(1, round(end / 0.05) + 1):
+        simulation.advance(0.05 * k, lambda: lengths.append(simulation.state_now.dt_old))
+        found.append(simulation.shape.r)
+    return np.array(found), np.array(lengths)
+
+
+def test_steps_are_held_so_that_a_fluid_with_inertia_keeps_its_operator(monkeypatch):
+    """Each length costs it two tables: one for the step that changes to it, one for those that follow."""
+    made, octant = [], mobility.octant
+    monkeypatch.setattr(mobility, "octant", lambda *given: made.append(1) or octant(*given))
+    _, lengths = _in_a_heavy_fluid(1e-3)
+    changes = int(np.sum(np.abs(np.diff(lengths)) > 1e-9 * lengths[1:]))
+    assert len(lengths) > 200
+    assert changes < 0.25 * len(lengths)  # where steps took every length they could it was 211 of 224
+    assert len(made) <= 2 * changes + 10  # those of rejected steps, and of the automatic step
+    assert np.allclose(lengths[-40:], lengths[-1], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_error_is_at_most_three_times_the_tolerance_in_a_fluid_with_inertia():
+    """It may be a tenth: most of it is made at the start, where the fluid is set in motion at once, and fades."""
+    reference, _ = _in_a_heavy_fluid(1e-6)
+    times = 0.05 * np.arange(1, len(reference) + 1)
+    for tolerance in (1e-2, 1e-3, 1e-4, 1e-5):
+        found, _ = _in_a_heavy_fluid(tolerance)
+        error = np.sqrt(np.mean(np.sum((found - reference) ** 2, axis=2), axis=1))
+        ratio = float(np.max(error / times)) / tolerance
+        assert 0.1 < ratio < 3, f"tolerance {tolerance:g}: {ratio:.2g} of it"
 
 
 def test_too_many_steps_are_a_clear_failure():
