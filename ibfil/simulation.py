@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, bounds, driving, timescales
+from . import assemble, driving, failures, timescales
 from .camera import Camera, Moment
 from .errors import CaseError, RunFailed
 from .fluid import Held
@@ -226,7 +226,7 @@ class Simulation:
 
     def give_up(self, reason: str, dt: float, node: int | None = None) -> None:
         """Raises RunFailed: no step of length dt can be taken, because of ``node`` if that is known."""
-        self._fail(bounds.unsolved(reason, dt, self.case.time.min_step, node, self._known(dt)))
+        self._fail(failures.unsolved(reason, dt, self.case.time.min_step, node, self._known(dt)))
 
     @property
     def shortened(self) -> int:
@@ -249,22 +249,22 @@ class Simulation:
             message = f"{self.steps} steps are taken (allowed: time.max_steps = {self.case.time.max_steps})"
             cause = f"steps of {time - before.time:.3g} for a time.end of {self.case.time.end:g}"
             cure = "a larger time.max_steps, a longer time.step, or a larger time.tolerance"
-            self._fail(bounds.Trouble(message, None, cause, cure))
+            self._fail(failures.Trouble(message, None, cause, cure))
         self._iterations = step.iterations
         self._look_at_bounds(step.state.shape, time - before.time)
         self._watch(before)
 
     def _look_at_bounds(self, shape: Geometry, dt: float) -> None:
-        found = bounds.out_of_bounds(self.mechanics.mesh, self._twisting, shape)
+        rods = self.mechanics
+        found = failures.out_of_bounds(rods.mesh, self._twisting, rods.stretching, shape)
         if found is not None:
-            stiffness = float(self.mechanics.stretching[found[1]])
-            self._fail(bounds.trouble(*found, self._known(dt), stiffness))
+            self._fail(found.trouble(self._known(dt)))
 
-    def _known(self, dt: float) -> bounds.Step:
+    def _known(self, dt: float) -> failures.Step:
         """What is known of a step that failed; the limit is that of the start, where the present is not finite."""
         explicit = self.case.time.scheme == "explicit"
         limit = timescales.explicit_limit(self.mechanics, self.fluid, self._rods.start, 0.0) if explicit else np.inf
-        return bounds.Step(dt, limit)
+        return failures.Step(dt, limit)
 
     def _look_at_crossing(self, dt: float) -> None:
         """Tells, once, of a given step in which the fluid moves too far for its extrapolated advection."""
@@ -287,7 +287,7 @@ class Simulation:
         """How many pairs of segments touch now; zero where the case has no [contact]."""
         return 0 if self._rods.contact is None else self._rods.contact.near(self.shape.r).i.size
 
-    def _fail(self, trouble: bounds.Trouble) -> None:
+    def _fail(self, trouble: failures.Trouble) -> None:
         message, node, cause, cure = trouble
         if node is None:
             raise RunFailed(message, time=self.time, cause=cause, advice=cure)

@@ -1,4 +1,4 @@
-"""When a run is out of bounds: what was found, the limit, the likely cause, the key to change. Each in one place.
+"""The ways in which a run fails: what was found, the limit, the likely cause, the key to change. Each in one place.
 
 The README lists these with what `ibfil check` warns of (groups.py) and what a case is refused for (case_checks.py).
 """
@@ -65,35 +65,62 @@ def _survey(joined, twisting, ds, r, length, twist):
     return high, low, turn, where, -1
 
 
-def out_of_bounds(mesh: Mesh, twisting: np.ndarray, shape: Geometry) -> tuple[str, int, float] | None:
-    """Which bound the configuration is beyond, at which node, and the number found; None within all of them."""
+class Diverged(NamedTuple):
+    """A position is no finite number at ``node``."""
+
+    node: int
+
+    def trouble(self, step: Step) -> Trouble:
+        """What to say of it."""
+        message = f"the run diverged: a position is no finite number any more (dt = {step.dt:.3g})"
+        return Trouble(message, self.node, step.cause(UNBOUNDED), step.cure("the loads, law or fluid.flow"))
+
+
+class OverStretched(NamedTuple):
+    """The segment after ``node``, of axial stiffness EA = ``stretching``, is ``ratio`` times its rest length."""
+
+    node: int
+    ratio: float
+    stretching: float
+
+    def trouble(self, step: Step) -> Trouble:
+        """What to say of it."""
+        message = f"a segment is {self.ratio:.3g} times its rest length (allowed {SHORTEST} to {LONGEST})"
+        pull = f"about {abs(self.ratio - 1.0) * self.stretching:.3g}, more than its EA = {self.stretching:.3g} bears"
+        cause = step.cause(f"the rod is pulled or pressed with {pull}")
+        cure = step.cure("a larger stretching, smaller loads, or a shorter time.step")
+        return Trouble(message, self.node, cause, cure)
+
+
+class OverTwisted(NamedTuple):
+    """The twist O3 ds of the segment after ``node`` is near a quarter turn; ``sine`` is that of Eq. 39."""
+
+    node: int
+    sine: float
+
+    def trouble(self, step: Step) -> Trouble:
+        """What to say of it."""
+        message = f"the twist between two nodes nears a quarter turn: sin = {self.sine:.3g} (allowed {LARGEST_TWIST})"
+        cause = step.cause("the rod is wound up faster than it unwinds, until Eq. 39 stops resisting")
+        return Trouble(message, self.node, cause, step.cure("more nodes, a slower spin, a larger twisting"))
+
+
+def out_of_bounds(
+    mesh: Mesh, twisting: np.ndarray, stretching: np.ndarray, shape: Geometry
+) -> Diverged | OverStretched | OverTwisted | None:
+    """The bound that the configuration is beyond; None within all of them.
+
+    ``twisting`` (n,) is True at nodes of filaments that twist, ``stretching`` (n,) is EA at half nodes.
+    """
     high, low, turn, where, bad = _survey(mesh.joined, twisting, mesh.ds, shape.r, shape.length, shape.twist)
     if bad >= 0:
-        return "finite", bad, np.nan
+        return Diverged(bad)
+    longest, shortest, twisted = (int(node) for node in where)
     if high > LONGEST:
-        return "stretch", int(where[0]), high
+        return OverStretched(longest, high, float(stretching[longest]))
     if low < SHORTEST:
-        return "stretch", int(where[1]), low
-    if turn > LARGEST_TWIST:
-        return "twist", int(where[2]), turn
-    return None
-
-
-def trouble(kind: str, node: int, found: float, step: Step, stiffness: float) -> Trouble:
-    """The words for `out_of_bounds`; ``stiffness`` is EA at the node."""
-    if kind == "finite":
-        message = f"the run diverged: a position is no finite number any more (dt = {step.dt:.3g})"
-        return Trouble(message, node, step.cause(UNBOUNDED), step.cure("the loads, law or fluid.flow"))
-    if kind == "stretch":
-        message = f"a segment is {found:.3g} times its rest length (allowed {SHORTEST} to {LONGEST})"
-        pull = abs(found - 1.0) * stiffness
-        cause = step.cause(
-            f"the rod is pulled or pressed with about {pull:.3g}, more than its EA = {stiffness:.3g} bears"
-        )
-        return Trouble(message, node, cause, step.cure("a larger stretching, smaller loads, or a shorter time.step"))
-    message = f"the twist between two nodes nears a quarter turn: sin = {found:.3g} (allowed {LARGEST_TWIST})"
-    cause = "the rod is wound up faster than it unwinds, until Eq. 39 stops resisting"
-    return Trouble(message, node, step.cause(cause), step.cure("more nodes, a slower spin, a larger twisting"))
+        return OverStretched(shortest, low, float(stretching[shortest]))
+    return OverTwisted(twisted, turn) if turn > LARGEST_TWIST else None
 
 
 def unsolved(reason: str, dt: float, smallest: float, node: int | None, step: Step) -> Trouble:
