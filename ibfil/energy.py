@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .fits import trapezoid_weights
+from .time_series import trapezoid_weights
 
 if TYPE_CHECKING:
     from .expressions import Expression

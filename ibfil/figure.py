@@ -17,7 +17,7 @@ import numpy as np
 from . import wrapping
 from .energy import elastic_energy
 from .errors import CaseError
-from .fits import trapezoid_weights
+from .time_series import trapezoid_weights
 from .units import label
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """The kinds of observables a case may name, `kind = ...` in [observe.NAME], that are read off each output.
 
 One class a kind. Points between nodes are on the cubic through the four nodes around them; directions are in
-the lab frame. Those whose number is fitted to the whole run are in fitted.py.
+the lab frame. Those whose number is fitted to the whole run are in observables_fitted.py.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from .fits import trapezoid_weights
 from .frames import FilamentFrame, Frame
+from .observables_place import Place
 from .observe import Kind, Unfit, Value
-from .place import Place
 from .shapes import node_arclength
+from .time_series import trapezoid_weights
 
 if TYPE_CHECKING:
     from .case_schema import Case, Observe

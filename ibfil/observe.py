@@ -1,7 +1,7 @@
 """The numbers of a run: what observables, stop rules and expectations have in common.
 
 An observable gives one value at every output, its series, which the run file keeps, and one number at the
-end, its summary. The kinds a case may name are in observables.py and fitted.py; from Python any object with
+end, its summary. The kinds a case may name are in observables.py and observables_fitted.py; from Python any object with
 the attributes of `Observable` may be added to a run.
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from . import fits
+from . import time_series
 from .errors import CaseError
 from .frames import Frame
 
@@ -124,7 +124,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
 
     Raises CaseError, a line for each observable or stop rule that asks for what its kind does not have.
     """
-    from . import fitted, observables  # noqa: F401  (they fill KINDS)
+    from . import observables, observables_fitted  # noqa: F401  (they fill KINDS)
     from .stops import stop_faults
 
     made: dict[str, Observable] = {}
@@ -207,8 +207,8 @@ class Kind:
         """Return the last, mean (over time), max, min or median of the outputs in `over`."""
         start, end = self.window(times)
         if self._how == "mean":
-            return plain(fits.mean(times, samples, start, end))
-        _, values = fits.cut(times, samples, start, end)
+            return plain(time_series.mean(times, samples, start, end))
+        _, values = time_series.cut(times, samples, start, end)
         if len(values) == 0:
             return plain(np.full(samples.shape[1:], np.nan))
         if self._how == "last":

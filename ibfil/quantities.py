@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import fits
+from . import time_series
 from .distance import arclength, common_outputs, rms, rms_of_shape
-from .fits import trapezoid_weights
+from .time_series import trapezoid_weights
 from .units import label
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def _of_filament(run: RunFile, name: str, window: Window) -> dict[str, Quantity]
     columns, s = run.filaments[name], arclength(run, name)
     position = np.asarray(columns["position"])
     centroid = np.einsum("n,tni->ti", trapezoid_weights(s) / (s[-1] - s[0]), position)
-    at = [[fits.at_time(run.time, centroid, t) for t in ends] for ends in window.each()]
+    at = [[time_series.at_time(run.time, centroid, t) for t in ends] for ends in window.each()]
     velocity = np.array([(after - before) / window.period for before, after in at])  # (count, 3)
     mean = velocity.mean(axis=0)
     speed = float(np.linalg.norm(mean))
@@ -95,7 +95,7 @@ def _of_filament(run: RunFile, name: str, window: Window) -> dict[str, Quantity]
 
 def _means(times: np.ndarray, values: np.ndarray, window: Window) -> np.ndarray:
     """The mean over each period, (count,) or (count, 3)."""
-    return np.array([fits.mean(times, values, start, end) for start, end in window.each()])
+    return np.array([time_series.mean(times, values, start, end) for start, end in window.each()])
 
 
 def _efficiency(run: RunFile, name: str, window: Window, velocity: np.ndarray, length: float) -> dict[str, Quantity]:
@@ -111,20 +111,19 @@ def _efficiency(run: RunFile, name: str, window: Window, velocity: np.ndarray, l
 
 def _frequency(times: np.ndarray, tip: np.ndarray, window: Window) -> Quantity | None:
     """Angular frequency of the tip seen along the two longest axes of its path; its error from the two halves."""
-    t, path = fits.cut(times, tip, window.start, window.end)
+    t, path = time_series.cut(times, tip, window.start, window.end)
     if len(t) < 8 or np.ptp(path) == 0:
         return None
     away = path - path.mean(axis=0)
     _, axes = np.linalg.eigh(away.T @ away)
     flat = path @ axes[:, [2, 1]]
     # About its mean: the path of a tip that is bent to one side as it turns is no circle about the axis.
-    rate = abs(fits.angular_rate(t, flat - flat.mean(axis=0)))
+    rate = abs(time_series.angular_rate(t, flat - flat.mean(axis=0)))
     if not np.isfinite(rate):
         return None
     half = len(t) // 2
-    parts = [
-        abs(fits.angular_rate(t[cut], flat[cut] - flat[cut].mean(axis=0))) for cut in (slice(half), slice(half, None))
-    ]
+    halves = (slice(half), slice(half, None))
+    parts = [abs(time_series.angular_rate(t[cut], flat[cut] - flat[cut].mean(axis=0))) for cut in halves]
     error = 0.5 * abs(parts[1] - parts[0]) if np.all(np.isfinite(parts)) else None
     return Quantity(float(rate), error, "rad/time")
 

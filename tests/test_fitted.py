@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import EVEN, LENGTH, NODES, UNEVEN, S, seen, straight, tip_at, value
 
-from ibfil import fits
+from ibfil import time_series
 
 # --- kinds that need the whole run -----------------------------------------------------------------------------------
 
@@ -214,4 +214,4 @@ def test_rate_of_any_ellipse(omega, phase, minor, tilt, sign):
     t = EVEN
     along, across = np.cos(omega * t + phase), sign * minor * np.sin(omega * t + phase)
     xy = np.column_stack([np.cos(tilt) * along - np.sin(tilt) * across, np.sin(tilt) * along + np.cos(tilt) * across])
-    assert fits.angular_rate(t, xy) == pytest.approx(sign * omega, rel=1e-8)
+    assert time_series.angular_rate(t, xy) == pytest.approx(sign * omega, rel=1e-8)

@@ -12,10 +12,16 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MODULES = {path.stem: path for path in (ROOT / "ibfil").glob("*.py")}
 
-CASE = {"case", "expressions", *(name for name in MODULES if name.startswith("case_"))}
+
+def with_prefix(prefix: str) -> set[str]:
+    """Modules whose names begin so: a group that stands together in the listing."""
+    return {name for name in MODULES if name.startswith(prefix)}
+
+
+CASE = {"expressions", *with_prefix("case")}
 FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "torque_coupling", "condensation", "immersed"}
 RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
-RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", "observables", "fitted", "expectations"}
+RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", *with_prefix("observables"), "expectations"}
 LOOKING = {"show", "figure", "vtk", "vtk_data", "opened", "render", "stage", "verify", "report", "bench", "cli"}
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}
 

@@ -7,8 +7,8 @@ import pytest
 from motions import CASE, LENGTH, NODES, RNG, S, frame, observing, seen, straight, tip_at, value
 
 from ibfil.case import parse_case
+from ibfil.observables_place import Place
 from ibfil.observe import observers
-from ibfil.place import Place
 
 # --- places ----------------------------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil import fits
+from ibfil import time_series
 from ibfil.members import Member
 
 from . import fig7_panels as panels
@@ -94,7 +94,7 @@ def _onset(runs: Runs) -> list[Row]:
         gamma = run.case.parameters["gamma"]
         middle, first = (run.position()[:, node, 1] for node in (run.case.filaments["rod"].nodes // 2, 0))
         late = run.time * gamma > 2
-        points.append((mu, fits.growth(run.time[late], np.abs(middle - first)[late]) / gamma))
+        points.append((mu, time_series.growth(run.time[late], np.abs(middle - first)[late]) / gamma))
     mu, rate = np.array(points).T
     zero = min(np.roots(np.polyfit(mu, rate, 2)), key=lambda root: abs(root - mu.mean())).real
     seconds = runs.seconds("fig7-onset")

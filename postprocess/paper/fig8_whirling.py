@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil import fits
+from ibfil import time_series
 from ibfil.members import Member
 
 from .drawing import COLOURS, axes_labels, new_figure, stroboscopic
@@ -124,12 +124,12 @@ def _fit(run: RunFile) -> tuple[float, float]:
     inside = run.time >= 10
     tip = run.position()[inside, -1, 1:]
     times = run.time[inside]
-    return fits.growth(times, _amplitude(run)[inside]) * ZETA, abs(fits.angular_rate(times, tip)) * ZETA
+    return time_series.growth(times, _amplitude(run)[inside]) * ZETA, abs(time_series.angular_rate(times, tip)) * ZETA
 
 
 def _rate(run: RunFile) -> float:
     late = run.time > 0.8 * run.time[-1]
-    return fits.angular_rate(run.time[late], run.position()[late, -1, 1:])
+    return time_series.angular_rate(run.time[late], run.position()[late, -1, 1:])
 
 
 def _onset_points(runs: Runs, ratio: float, radius: float) -> np.ndarray:

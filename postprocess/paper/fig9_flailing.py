@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil import fits
+from ibfil import time_series
 from ibfil.members import Member
 
 from .drawing import COLOURS, axes_labels, new_figure, stroboscopic
@@ -80,7 +80,8 @@ def _growth(run) -> tuple[float, float]:
     times, z = run.time, run.position()[:, -1, 2]
     inside = (times >= 2) & (times <= 8)
     seen = np.column_stack([z[inside], np.zeros(inside.sum())])
-    return fits.growth(times[inside], np.abs(z[inside])) * ZETA, fits.angular_rate(times[inside], seen) * ZETA
+    growth = time_series.growth(times[inside], np.abs(z[inside]))
+    return growth * ZETA, time_series.angular_rate(times[inside], seen) * ZETA
 
 
 def _onset(runs: Runs) -> list[Row]:
@@ -111,7 +112,7 @@ def _rate(run) -> float:
     """Frequency of the tip in the last quarter of the run."""
     times, tip = run.time, run.position()[:, -1, 1:]
     late = times > 0.75 * times[-1]
-    return abs(fits.angular_rate(times[late], tip[late]))
+    return abs(time_series.angular_rate(times[late], tip[late]))
 
 
 def _states(runs: Runs) -> list[Row]:
@@ -152,7 +153,7 @@ def _branches(runs: Runs) -> list[Row]:
 def _planarity(run) -> float:
     """Smaller over larger variance of the tip across x in the last sixth: 0 in a plane, 1 on a circle."""
     late = run.time > run.time[-1] * 5 / 6
-    return fits.circularity(run.time[late], run.position()[late, -1, 1:])
+    return time_series.circularity(run.time[late], run.position()[late, -1, 1:])
 
 
 def _ramp(run) -> tuple[np.ndarray, np.ndarray]:
@@ -162,7 +163,7 @@ def _ramp(run) -> tuple[np.ndarray, np.ndarray]:
     width = []
     for start in starts:
         inside = (run.time >= start) & (run.time < start + 1)
-        width.append(fits.circularity(run.time[inside], tips[inside]))
+        width.append(time_series.circularity(run.time[inside], tips[inside]))
     return np.where(starts < 6, 60.0, 60.0 + 2 * (starts + 0.5 - 6)), np.array(width)
 
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from . import fits
+from . import time_series
 from .frames import Frame
 from .observables import Amplitude, AtPlace, Component, OfFilament
+from .observables_place import Place
 from .observe import Unfit, Value, plain
-from .place import Place
 
 if TYPE_CHECKING:
     from .case_schema import Case, Observe
@@ -42,12 +42,12 @@ class Drift(Component, kind="drift"):
         start, end = self.window(times)
         if end <= start:
             return plain(np.full(samples.shape[1:], np.nan))
-        moved = fits.at_time(times, samples, end) - fits.at_time(times, samples, start)
+        moved = time_series.at_time(times, samples, end) - time_series.at_time(times, samples, start)
         return plain(moved / (end - start))
 
 
 class Growth(Amplitude, kind="growth"):
-    """Rate of exponential growth of the amplitude (`fits.growth`). The series is the amplitude."""
+    """Rate of exponential growth of the amplitude (`time_series.growth`). The series is the amplitude."""
 
     keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", "over")
     fitted = True
@@ -56,7 +56,7 @@ class Growth(Amplitude, kind="growth"):
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the rate over `over`."""
-        return fits.growth(*fits.cut(times, samples, *self.window(times)))
+        return time_series.growth(*time_series.cut(times, samples, *self.window(times)))
 
 
 class AcrossAxis(AtPlace):
@@ -79,7 +79,7 @@ class AcrossAxis(AtPlace):
         first = np.eye(3)[(int(np.argmax(np.abs(self.axis))) + 1) % 3]
         first = first - (first @ self.axis) * self.axis
         first /= np.linalg.norm(first)
-        times, samples = fits.cut(times, samples, *self.window(times))
+        times, samples = time_series.cut(times, samples, *self.window(times))
         return times, samples @ np.column_stack([first, np.cross(self.axis, first)])
 
 
@@ -95,11 +95,11 @@ class Circularity(AcrossAxis, kind="circularity"):
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the ratio over `over`."""
-        return fits.circularity(*self.seen(times, samples))
+        return time_series.circularity(*self.seen(times, samples))
 
 
 class Frequency(AcrossAxis, kind="frequency"):
-    """Angular frequency, radians per time (`fits.angular_rate`).
+    """Angular frequency, radians per time (`time_series.angular_rate`).
 
     Of rotation about the line through the node at s = 0 along `along`, right-handed, or of oscillation across
     it. The series is the position seen from that node (from the centroid where `at` is the start).
@@ -119,7 +119,7 @@ class Frequency(AcrossAxis, kind="frequency"):
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the rate over `over`."""
-        return fits.angular_rate(*self.seen(times, samples))
+        return time_series.angular_rate(*self.seen(times, samples))
 
 
 class DiffusionRatio(AtPlace, kind="diffusion_ratio"):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .fits import trapezoid_weights
 from .mesh import weights
+from .time_series import trapezoid_weights
 
 At = str | float | tuple[float, float]
 
