@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import assemble_grid, assemble_laws, copies, costs, rft, shapes, stepping
+from . import assemble_grid, assemble_laws, costs, rft, shape_copies, shapes, stepping
 from .along import alone, along, half
 from .assemble_loads import loads, number, triple
 from .case_schema import Coefficients, Matched
@@ -95,7 +95,7 @@ def _place(case: Case) -> list[Placed]:
         if filament.copies is None:
             out.append(Placed(name, filament, s, r, e1, held))
             continue
-        for k, turn, shift in copies.places(filament.copies, filament.position, key, folder):
+        for k, turn, shift in shape_copies.places(filament.copies, filament.position, key, folder):
             moved = (r - filament.position) @ turn.T + shift
             turned = tuple(None if t is None else turn @ t for t in held)
             out.append(Placed(f"{name}_{k:03d}", filament, s, moved, e1 @ turn.T, turned))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .curves import (
+from .errors import CaseError
+from .shape_curves import (
     Curve,
     curve_from_formula,
     curve_from_strains,
@@ -16,9 +17,8 @@ from .curves import (
     integrate_frame,
     unit,
 )
-from .errors import CaseError
-from .placing import place
-from .points import curve_from_points, read_points
+from .shape_placing import place
+from .shape_points import curve_from_points, read_points
 
 if TYPE_CHECKING:
     from .case_schema import Filament, Helix, Noise
@@ -51,10 +51,10 @@ def node_arclength(filament: Filament, key: str = "filament") -> np.ndarray:
 def initial_shape(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:
     """Positions r (N, 3), in the case's length, and unit directors e1 (N, 3) at t = 0, in the lab frame.
 
-    The shape's own curve and frame are placed (``placing.place``), then e1 is turned about e3 by the
+    The shape's own curve and frame are placed (``shape_placing.place``), then e1 is turned about e3 by the
     integral of ``twist`` from s = 0, then ``perturb`` and ``noise`` are added to r. e1 is normal to the
     tangent of the placed curve; the tangents of stencils, on perturbed nodes, differ, so who has them
-    calls ``curves.perpendicular``. A curve bent by kappa1 alone has e1 = ``normal``, with the same bits
+    calls ``shape_curves.perpendicular``. A curve bent by kappa1 alone has e1 = ``normal``, with the same bits
     at every node.
 
     Kinds, in their own frame (O1, O2, O3):
@@ -67,8 +67,8 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
     * circle: (curvature, 0, 0), an arc of at most one turn that bends to the left seen from the tip of e1.
     * expression: nodes at r(s), also where |dr/ds| is not 1: the rod then starts stretched
       (``stretch_warning``); e1 without twist.
-    * file: points in the file (``points.curve_from_points``), relative to ``folder``.
-    * run: as the filament of the same name, which ``key`` ends with, stood in a run (``points_of_run``), relative to
+    * file: points in the file (``shape_points.curve_from_points``), relative to ``folder``.
+    * run: as the filament of the same name, which ``key`` ends with, stood in a run (``shape_from_run``), relative to
       ``folder``; it is not placed anew.
 
     Raises CaseError, one line beginning with ``key``, where the shape cannot be made.
@@ -116,7 +116,7 @@ def _placed(filament: Filament, s: np.ndarray, key: str, folder: Path) -> Curve:
     """Make the curve of ``shape.kind`` where it is to be; that of another run is there already."""
     if filament.shape.kind != "run":
         return place(_own_curve(filament, s, key, folder), s, filament, key)
-    from .points_of_run import curve_from_run
+    from .shape_from_run import curve_from_run
 
     try:
         return curve_from_run(filament, key.rpartition(".")[2], s, folder)

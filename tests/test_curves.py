@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shape_scene import ARC, KEY, SPATIAL, X, Z, fault, rod
 
-from ibfil.curves import _motions, curve_from_formula, integrate_frame, perpendicular
+from ibfil.shape_curves import _motions, curve_from_formula, integrate_frame, perpendicular
 from ibfil.shapes import initial_shape, node_arclength, stretch_warning
 
 

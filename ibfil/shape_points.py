@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .curves import Curve, carried_frame, perpendicular, unit
+from .shape_curves import Curve, carried_frame, perpendicular, unit
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

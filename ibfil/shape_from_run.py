@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .curves import Curve, unit
 from .errors import CaseError
 from .mesh import clamped_weights, ghost_weights
+from .shape_curves import Curve, unit
 
 if TYPE_CHECKING:
     from .case_filament import Filament, RunShape

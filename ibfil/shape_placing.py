@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .curves import Curve, unit
 from .errors import CaseError
+from .shape_curves import Curve, unit
 
 if TYPE_CHECKING:
     from .case_schema import Filament
