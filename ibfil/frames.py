@@ -1,4 +1,4 @@
-"""What one output holds. The simulation makes frames; the record, the observables and the pictures read them."""
+"""What one output holds. diagnostics.py makes frames; the record, the observables and the pictures read them."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import assemble, driving, failures, timescales
-from .camera import Camera, Moment
+from .diagnostics import Diagnostics, Instant
 from .errors import CaseError, RunFailed
 from .fluid import Held
 from .geometry import Geometry
@@ -40,7 +40,7 @@ class Simulation:
         if case.fluid.model != "rft":
             self._learn()
         self.fluid, self.method, self.grid = assemble.fluid(case, self._rods)
-        self._camera = Camera(case, self._rods, self.fluid, self.grid)
+        self._diagnostics = Diagnostics(case, self._rods, self.fluid, self.grid)
         self._noise = assemble.noise(case, self._rods)
         self._stepper = assemble.stepper(case, self._noise)
         n, m = len(self._rods.s), self.mechanics.unknowns
@@ -312,7 +312,8 @@ class Simulation:
 
     def frame(self, fields: Sequence[str] = ()) -> Frame:
         """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
-        return self._camera.frame(Moment(self.state_now, *self._motion(), self._iterations, self.shortened), fields)
+        now = Instant(self.state_now, *self._motion(), self._iterations, self.shortened)
+        return self._diagnostics.frame(now, fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""What an output shows: the frame of all filaments at one moment, its diagnostics, and fields where asked for."""
+"""What an output holds (frames.py), taken from a running simulation: all filaments, diagnostics, fields where due."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from .stepping import State
 
 
-class Moment(NamedTuple):
-    """A simulation at one moment: the state, and velocity, force on the fluid, reaction (n, m) of the step to it."""
+class Instant(NamedTuple):
+    """A simulation at one instant: the state, and velocity, force on the fluid, reaction (n, m) of the step to it."""
 
     state: State
     velocity: np.ndarray
@@ -32,16 +32,16 @@ class Moment(NamedTuple):
     shortened: int
 
 
-class Camera:
+class Diagnostics:
     """Takes frames of one scene. Fields cost an evaluation of the fluid; their plans are made at the first."""
 
     def __init__(self, case: Case, rods: Stacked, fluid: Fluid, grid: Grid | None) -> None:
         self.case, self.fluid, self.grid = case, fluid, grid
         self._rods, self._mechanics = rods, rods.mechanics
         self._fields: GridFields | None = None
-        self._heat = any(one.kind == "dissipation" for one in case.observe.values())
+        self._wants_dissipation = any(one.kind == "dissipation" for one in case.observe.values())
 
-    def frame(self, now: Moment, fields: Sequence[str] = ()) -> Frame:
+    def frame(self, now: Instant, fields: Sequence[str] = ()) -> Frame:
         """All filaments with diagnostics, and the ``fields`` named."""
         shape = now.state.shape
         moment, strain = self._nodal_moment(now.state)
@@ -64,10 +64,10 @@ class Camera:
                 *ends,
                 **self._twisting(description, now, where),
             )
-        grid = self._grid_fields(fields, now) if fields else None
-        return Frame(now.state.time, filaments, self._diagnostics(now), grid)
+        grid = self._evaluate(fields, now) if fields else None
+        return Frame(now.state.time, filaments, self._of_all(now), grid)
 
-    def _twisting(self, filament: Filament, now: Moment, where: slice) -> dict[str, np.ndarray]:
+    def _twisting(self, filament: Filament, now: Instant, where: slice) -> dict[str, np.ndarray]:
         """The twist torque and the spin (N, 3) of a filament that twists, by name."""
         if filament.twisting is None:
             return {}
@@ -90,7 +90,8 @@ class Camera:
                 nodal[i] = np.stack([shape.e1[i], shape.e2[i], shape.e3[i]]) @ load.moment(shape, state.time)
         return nodal, np.column_stack([shape.bend, thirds[1]])
 
-    def _diagnostics(self, now: Moment) -> dict[str, float | np.ndarray]:
+    def _of_all(self, now: Instant) -> dict[str, float | np.ndarray]:
+        """The diagnostics of all filaments together, by name."""
         shape, mesh, force = now.state.shape, self._mechanics.mesh, now.force
         stretch = (shape.length / mesh.ds)[mesh.joined] - 1.0
         torque = np.cross(shape.r, force[:, :3]).sum(axis=0)
@@ -108,14 +109,14 @@ class Camera:
         if self.grid is not None and self.case.output.probes:
             points = np.array(self.case.output.probes)
             out["probe_velocity"] = self.fluid.velocity_at(points, shape.r, shape.e3, force, now.state.time)
-        if self._heat:
+        if self._wants_dissipation:
             out |= self._dissipation(now)
         contact = self._rods.contact
         if contact is not None:
             out |= {"contacts": float(contact.near(shape.r).i.size), "first_contact": contact.since}
         return out
 
-    def _dissipation(self, now: Moment) -> dict[str, float | np.ndarray]:
+    def _dissipation(self, now: Instant) -> dict[str, float | np.ndarray]:
         """What the fluid turns into heat: F.(u - u0) of drag; eta int |grad u|^2 of a grid, and the nodes' side."""
         force, shape, time = now.force, now.state.shape, now.state.time
         if self.grid is None:
@@ -134,13 +135,13 @@ class Camera:
             self._fields = assemble.fields(self.case, self.fluid, self.grid)
         return self._fields
 
-    def _pushes(self, now: Moment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _pushes(self, now: Instant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The stencils of the nodes, and the vectors that they put onto the grid."""
         assert self.grid is not None
         base, weights = assemble_grid.kernel(self.case).stencil(self.grid.coordinates(now.state.shape.r))
         coupling = assemble_grid.coupling(self.case, self._rods)
         return base, weights, coupling.lift(coupling.axes(now.state.shape.e3), now.force)
 
-    def _grid_fields(self, fields: Sequence[str], now: Moment) -> dict[str, np.ndarray]:
+    def _evaluate(self, fields: Sequence[str], now: Instant) -> dict[str, np.ndarray]:
         """Fields on the grid: one evaluation of the fluid."""
         return self._grid().evaluate(*self._pushes(now), now.state.time, fields)
