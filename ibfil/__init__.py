@@ -11,11 +11,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .analysis import Run
+    from .analysis import open_run as open
     from .case import Case, parse_case, read_case
     from .errors import CaseError, Interrupted, RunFailed
     from .members import Member, Outcome, run_members
-    from .opened import Run
-    from .opened import open_run as open
     from .running import run
     from .simulation import Simulation
     from .vtk import write_vtk
@@ -32,8 +32,8 @@ _HOME = {
     "Member": "members",
     "Outcome": "members",
     "run_members": "members",
-    "Run": "opened",
-    "open": "opened:open_run",
+    "Run": "analysis",
+    "open": "analysis:open_run",
     "run": "running",
     "Simulation": "simulation",
     "write_vtk": "vtk",

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from .analysis import Run, open_run
 from .errors import CaseError
 from .lettering import Words, bands, lettered
-from .opened import Run, open_run
 from .stage import FLOW, QUANTITIES, TIMES, Frame, Scale, Stage, frame_for, quantity
 from .units import label
 from .viewpoint import viewpoint

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pyvista
     from matplotlib.colors import Colormap
 
-    from .opened import Run
+    from .analysis import Run
 
 SIDES = 24  # of a tube
 MARGIN = 1.12  # of what the filaments reach

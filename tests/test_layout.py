@@ -22,7 +22,7 @@ CASE = {"expressions", *with_prefix("case")}
 FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "torque_coupling", "condensation", "immersed"}
 RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", *with_prefix("observables"), "expectations"}
-LOOKING = {"show", "figure", "vtk", "vtk_data", "opened", "render", "stage", "verify", "report", "bench", "cli"}
+LOOKING = {"show", "figure", "vtk", "vtk_data", "analysis", "render", "stage", "verify", "report", "bench", "cli"}
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}
 
 
@@ -77,7 +77,7 @@ def test_a_case_is_data_and_knows_nothing_that_runs_it():
 def test_only_what_draws_loads_what_draws_and_only_when_it_does():
     for name in MODULES:
         assert not imports(name, at_load=True) & (DRAWING - {"vtk"}), name
-        may = name.endswith("figure") or name in ("vtk", "vtk_data", "opened", "render", "stage", "lettering")
+        may = name.endswith("figure") or name in ("vtk", "vtk_data", "analysis", "render", "stage", "lettering")
         if not may:
             assert not imports(name) & (DRAWING - {"vtk"}), name
 

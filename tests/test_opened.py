@@ -100,7 +100,7 @@ def test_flow_that_is_not_known_is_refused(bent, tmp_path):
 
 def test_a_recorded_field_is_interpolated(made):
     """The made flow is linear in space but for x y, and linear in time: exact at grid points and along axes."""
-    from ibfil.flow import FlowOfField
+    from ibfil.recorded_flow import FlowOfField
 
     points = ORIGIN + SPACING * np.array([[1.0, 2.0, 3.0], [1.5, 2.0, 1.0], [4.0, 2.25, 0.5]])
     with ibfil.open(made) as run:

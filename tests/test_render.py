@@ -11,10 +11,10 @@ import pytest
 from made_run import make_run
 
 from ibfil import render
+from ibfil.analysis import open_run
 from ibfil.cli import main
 from ibfil.errors import CaseError
 from ibfil.lettering import Words, bands, lettered
-from ibfil.opened import open_run
 from ibfil.render import Wish
 from ibfil.stage import Scale, frame_for
 from ibfil.viewpoint import viewpoint
@@ -121,7 +121,7 @@ def test_a_picture_shows_two_tubes_where_they_are(run, tmp_path):
 @pytest.mark.parametrize("flow", ["slice", "glyphs", "streamlines"])
 def test_the_flow_is_drawn(run, tmp_path, flow, monkeypatch):
     """The made run has no forces that make its made flow, so the recorded field is read here."""
-    from ibfil import flow as flows
+    from ibfil import recorded_flow as flows
 
     monkeypatch.setattr(flows, "FlowOfForces", lambda opened: flows.FlowOfField(opened, opened.grid))
     bare, full = tmp_path / "bare.png", tmp_path / "full.png"

@@ -1,4 +1,4 @@
-"""A run opened from Python: `ibfil.open`. What record.py reads, and what can be made of it: flow, meshes, a dataset."""
+"""A run opened from Python for analysis: `ibfil.open`. What record.py reads, and the flow, meshes, a dataset of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pyvista
     import xarray
 
-    from .flow import Flow
+    from .recorded_flow import Flow
 
 
 def open_run(path: str | Path) -> Run:
@@ -66,7 +66,7 @@ class Run(RunFile):
         (2, 3)
         """
         if self._flow is None:
-            from .flow import flow_of
+            from .recorded_flow import flow_of
 
             self._flow = flow_of(self)
         wanted = np.atleast_2d(np.asarray(points, float))
