@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, driving, failures, timescales
+from . import assemble, failures, timescales
 from .diagnostics import Diagnostics, Instant
 from .errors import CaseError, RunFailed
 from .fluid import Held
@@ -139,11 +139,11 @@ class Simulation:
     @cached_property
     def cycles(self) -> list[float]:
         """How fast it is driven by what changes in time."""
-        return driving.cycles(self)
+        return timescales.cycles(self)
 
     @cached_property
     def _pushes(self) -> list[float]:
-        return driving.pushes(self)
+        return timescales.pushes(self)
 
     def drag(self, filament) -> float:
         """A drag per length across, for time scales: the case's own in RFT, 4 pi eta on a grid."""

@@ -1,18 +1,28 @@
-"""What happens how fast in a scene: periods, relaxation times, the explicit limit, and the automatic step."""
+"""What happens how fast in a scene: what drives it, relaxation times, the explicit limit, and the automatic step.
+
+How fast a scene is driven, in radians per time, is what the automatic step and the dimensionless groups rest on:
+`cycles` of what is prescribed to change in time, `pushes` of what has no period.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import assemble, banded
+from .assemble_loads import triple
+from .expressions import Expression
 from .fluid import Fluid, Held
 from .geometry import Geometry
+from .loads import BodyForce, Dead, Follower, Place
 from .mechanics import Mechanics
 
 if TYPE_CHECKING:
-    from .case_filament import Filament
+    from .case_filament import End, Filament
+    from .simulation import Simulation
 
 POINTS_A_PERIOD = 25
 _SETTLED = 0.01  # of the explicit limit, where it depends on the step itself
@@ -51,6 +61,93 @@ def wave_number(value: Callable[[np.ndarray], np.ndarray], s: np.ndarray) -> flo
     return float(np.max(np.abs(np.gradient(samples, fine)))) / size if size > 1e-12 else 0.0
 
 
+def cycles(simulation: Simulation) -> list[float]:
+    """The rates of all that is prescribed to change in time: strains, spins, moving ends, loads, the flow."""
+    case, end = simulation.case, simulation.case.time.end
+    rates = []
+    for filament in case.filaments.values():
+        s = np.linspace(0.0, filament.length, 101)
+        for expression in (*filament.curvature, filament.twist_rate, *_in_internal_moment(filament)):
+            if "t" in expression.variables:
+                rates.append(angular_rate(partial(expression.bind("s", "t"), s), end))
+        for held in (filament.start, filament.finish):
+            rates += _rates_of_end(held, end)
+    if any("t" in e.variables for f in case.filaments.values() for e in _in_loads(f)):
+        rates.append(angular_rate(partial(_applied, simulation), end))
+    flow = assemble.flow(case)
+    if flow is not None and any("t" in e.variables for e in case.fluid.flow or ()):
+        rates.append(angular_rate(partial(flow, simulation.start.r), end))
+    return [rate for rate in rates if rate > 0]
+
+
+def pushes(simulation: Simulation) -> list[float]:
+    """The rates of what pushes without a period: a turn is the time in which it moves a rod by its own length.
+
+    A force F does that in zeta L^2/F, a flow in L over its change along the rod.
+    """
+    case, rates = simulation.case, []
+    times = np.linspace(0.0, case.time.end, 101)
+    slowest = min(simulation.drag(f) * f.length**2 for f in case.filaments.values())
+    for load in simulation.mechanics.loads:
+        if isinstance(load, (Follower, Dead, Place, BodyForce)):
+            size = max(float(np.linalg.norm(_force(simulation, load, t), axis=1).sum()) for t in times)
+            rates.append(2 * np.pi * size / slowest)
+    flow = assemble.flow(case)
+    if flow is not None:
+        for name, filament in case.filaments.items():
+            r = simulation.start.r[simulation.nodes(name)]
+            size = max(float(np.linalg.norm(np.ptp(flow(r, t), axis=0))) for t in times)
+            rates.append(2 * np.pi * size / filament.length)
+    return [rate for rate in rates if rate > 0]
+
+
+def _in_internal_moment(filament: Filament) -> Iterable[Expression]:
+    loads = filament.loads
+    return () if loads is None or loads.internal_moment is None else loads.internal_moment
+
+
+def _rates_of_end(end: End, horizon: float) -> Iterator[float]:
+    """The rates of a spin, a turn, a place that is prescribed."""
+    times = np.linspace(0.0, horizon, 1001)
+    if end.spin is not None:
+        spin = end.spin.bind("t")
+        yield max(abs(float(spin(t))) for t in times)
+    if end.angle is not None:
+        angle = end.angle.bind("t")
+        yield float(np.max(np.abs(np.gradient([float(angle(t)) for t in times], times))))
+    if end.moves is not None and any("t" in e.variables for e in end.moves):
+        yield angular_rate(triple(end.moves, "t"), horizon)
+
+
+def _in_loads(filament: Filament) -> Iterator[Expression]:
+    """All expressions in the external loads of a filament."""
+    for end in (filament.start, filament.finish):
+        yield from (*(end.force or ()), *(end.moment or ()), *([end.follower] if end.follower else ()))
+    loads = filament.loads
+    if loads is not None:
+        yield from (*(loads.force or ()), *(loads.body_force or ()), *(loads.moment or ()))
+        if loads.tether is not None and loads.tether.to != "initial":
+            yield from loads.tether.to
+
+
+def _force(simulation: Simulation, load, time: float) -> np.ndarray:
+    """What a load puts on the nodes of the start shape (n, 3)."""
+    force = np.zeros((len(simulation.start.r), simulation.mechanics.unknowns))
+    load.add_force(simulation.start, time, force)
+    return force[:, :3]
+
+
+def _applied(simulation: Simulation, time: float) -> np.ndarray:
+    """All loads on the nodes of the start shape (n, m)."""
+    force = np.zeros((len(simulation.start.r), simulation.mechanics.unknowns))
+    for load in simulation.mechanics.loads:
+        load.add_force(simulation.start, time, force)
+    return force
+
+
+# --- how long things take -----------------------------------------------------------------------------------------
+
+
 def softest(filament: Filament) -> float:
     """The smallest bending modulus along a filament."""
     s = np.linspace(0.0, filament.length, 11)
@@ -63,7 +160,7 @@ def bending_time(drag: float, length: float, bending: float, start: str, finish:
 
 
 def implicit_step(cycles: list[float], pushes: list[float], slowest: float) -> float:
-    """1/25 of the shortest period of what drives the rods, by the rates (radians per time) of driving.py.
+    """1/25 of the shortest period of what drives the rods, by the rates (radians per time) of `cycles` and `pushes`.
 
     Where nothing changes in time, no longer than 1/25 of the slowest bending time either: the rods go to rest in that.
     """
@@ -91,8 +188,6 @@ def explicit_limit(rods: Mechanics, fluid: Fluid, shape: Geometry, time: float, 
     modes close together, some hundreds of iterations, it is then within 1 %. A fluid with inertia moves the more the
     longer the step is, up to Stokes flow: then it is the step dt with dt = 2/rho(M(dt) K), which errs on the safe side.
     """
-    from . import banded
-
     force, inner = rods.forces(shape, time)
     matrix = rods.stiffness(shape, shape, inner, time, False)
     held = Held(rods.ends.index, np.zeros(rods.ends.index.size))
