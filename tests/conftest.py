@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
+from made_run import BENT
+
+
+@pytest.fixture
+def environment():
+    """The environment, in which a command sets numbers of threads: that is undone."""
+    before = dict(os.environ)
+    yield os.environ
+    os.environ.clear()
+    os.environ.update(before)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch, environment) -> Path:
+    """The folder in which a test is, with a case that is run in a moment."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bent.toml").write_text(BENT)
+    return tmp_path
 
 
 @pytest.fixture

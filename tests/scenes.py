@@ -22,6 +22,20 @@ from ibfil.simulation import Simulation
 # A grid small enough for tests: nodes further apart than cells, so nothing locks (numerics.md, 4.3).
 STOKES: Mapping[str, Any] = {"model": "stokes", "box": [2.0, 2.0, 2.0], "cells": [32, 32, 32], "slip": 0.01}
 RFT: Mapping[str, Any] = {"model": "rft"}
+# Every unknown at work: bent and twisted in space by strains of its own, and spun at a clamp.
+RIBBON: Mapping[str, Any] = {
+    "length": 1.0,
+    "nodes": 11,
+    "bending": [1.0, 0.5],
+    "twisting": 0.7,
+    "stretching": 400.0,
+    "radius": 0.05,
+    "curvature": ["6*sin(2*pi*s - 10*t)", "3*cos(10*t)"],
+    "twist_rate": "5*sin(10*t)",
+    "shape": {"kind": "relaxed"},
+    "normal": [0, 1, 0],
+    "start": {"end": "clamped", "spin": 15.0},
+}
 
 
 def scene(

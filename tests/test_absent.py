@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_run import BENT
 
 from ibfil import fields, loop, mechanics, thermal, transforms
 from ibfil.case import parse_case
@@ -13,31 +14,13 @@ from ibfil.running import run
 from ibfil.simulation import Simulation
 from ibfil.terms import shares, terms
 
-SCENE = """
-[filament.rod]
-length = 1.0
-nodes = 9
-derivative = 2
-bending = 1.0
-stretching = 100.0
-shape = { kind = "circle", curvature = 1.0 }
-[fluid]
-model = "rft"
-viscosity = 1.0
-box = [2.0, 2.0, 2.0]
-cells = [16, 16, 16]
-[time]
-end = 0.01
-step = 1e-3
-[output]
-every = 0.002
-"""
+BOX = ("fluid.box=[2.0, 2.0, 2.0]", "fluid.cells=[16, 16, 16]", "time.end=0.01", "output.every=0.002")
 GRID = ("fluid.model=stokes",)
 ALL = ("filament.rod.twisting=1.0", "filament.rod.radius=0.01", "thermal.energy=1e-9", "contact.action=warn")
 
 
 def case(*overrides: str):
-    return parse_case(SCENE, "scene.toml", overrides)
+    return parse_case(BENT, "bent.toml", (*BOX, *overrides))
 
 
 def ran(*overrides: str):

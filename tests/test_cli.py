@@ -20,20 +20,7 @@ from ibfil.record import RunFile
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.fixture(autouse=True)
-def _environment(monkeypatch: pytest.MonkeyPatch):
-    """What a command sets for its threads is undone."""
-    before = dict(os.environ)
-    yield
-    os.environ.clear()
-    os.environ.update(before)
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bent.toml").write_text(BENT)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("environment")
 
 
 def ibfil(*words: str, **more) -> subprocess.CompletedProcess[str]:

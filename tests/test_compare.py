@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 
 import numpy as np
 import pytest
@@ -156,13 +155,10 @@ def test_the_window_leaves_the_transient_out_and_counts_whole_periods():
     assert choose_window(still, 8.0, None, None) == Window(8.0, 1.0, 4)
 
 
-def test_a_fluid_that_fails_is_told_and_the_others_are_compared(tmp_path, monkeypatch, capsys):
+def test_a_fluid_that_fails_is_told_and_the_others_are_compared(tmp_path, monkeypatch, environment, capsys):
     monkeypatch.chdir(tmp_path)
-    before = dict(os.environ)
     (tmp_path / "s.toml").write_text(SWIMMER.replace("density = 1.0", ""))
     assert cli.main(["compare", "s.toml", "--fluids", "rft,slender,navier-stokes", "-o", "out"]) == 1
-    os.environ.clear()
-    os.environ.update(before)
     out = capsys.readouterr().out
     assert "density" in out
     assert "rft" in out

@@ -8,31 +8,13 @@ import inspect
 from pathlib import Path
 
 import pytest
+from made_run import BENT
 
 import ibfil
 
-CASE = """
-[filament.rod]
-length = 1.0
-nodes = 9
-derivative = 2
-bending = 1.0
-stretching = 100.0
-shape = { kind = "circle", curvature = 1.0 }
-[fluid]
-model = "stokes"
-viscosity = 1.0
-box = [2.0, 2.0, 2.0]
-cells = [16, 16, 16]
-[time]
-end = 0.002
-step = 1e-3
-[output]
-every = 0.001
-[observe.tip]
-kind = "position"
-at = "finish"
-"""
+TIP = '[observe.tip]\nkind = "position"\nat = "finish"\n'
+GRID = ("fluid.model=stokes", "fluid.box=[2.0, 2.0, 2.0]", "fluid.cells=[16, 16, 16]")
+SHORT = ("time.end=0.002", "output.every=0.001")
 
 
 def modules_with_examples() -> list[str]:
@@ -43,7 +25,7 @@ def modules_with_examples() -> list[str]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     made = tmp_path_factory.mktemp("examples")
-    (made / "case.toml").write_text(CASE)
+    (made / "case.toml").write_text(ibfil.parse_case(BENT + TIP, "case.toml", [*GRID, *SHORT]).text)
     ibfil.run(made / "case.toml", made / "run.h5", log=lambda line: None)
     return made
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from scenes import STOKES, rms, run, scene, slopes, swimmer, twisting_rod
+from scenes import RIBBON, STOKES, rms, run, scene, slopes, swimmer, twisting_rod
 
 from ibfil.case import Case
 from ibfil.geometry import Geometry
@@ -238,19 +238,6 @@ SWIMMER: dict[str, Any] = {
     "stretching": 400.0,
     "curvature": ["8*sin(4*pi*s - 10*t)", 0],
     "shape": {"kind": "relaxed"},
-}
-RIBBON: dict[str, Any] = {
-    "length": 1.0,
-    "nodes": 11,
-    "bending": [1.0, 0.5],
-    "twisting": 0.7,
-    "stretching": 400.0,
-    "radius": 0.05,
-    "curvature": ["6*sin(2*pi*s - 10*t)", "3*cos(10*t)"],
-    "twist_rate": "5*sin(10*t)",
-    "shape": {"kind": "relaxed"},
-    "normal": [0, 1, 0],
-    "start": {"end": "clamped", "spin": 15.0},
 }
 RODS = pytest.mark.parametrize("rod", [SWIMMER, RIBBON], ids=["swimmer", "spun ribbon"])
 METHODS = pytest.mark.parametrize("method", ["table", "fft"])

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from made_run import BENT
 
 ROOT = Path(__file__).parent.parent
 MODULES = {path.stem: path for path in (ROOT / "ibfil").glob("*.py")}
@@ -110,25 +111,6 @@ def test_a_run_knows_nothing_of_studies_and_a_worker_loads_little():
         assert outside <= set(sys.stdlib_module_names), name
 
 
-RUN = """
-[filament.rod]
-length = 1.0
-nodes = 9
-derivative = 2
-bending = 1.0
-stretching = 100.0
-shape = { kind = "circle", curvature = 1.0 }
-[fluid]
-MODEL
-viscosity = 1.0
-[time]
-end = 0.002
-step = 1e-3
-[output]
-every = 0.001
-"""
-
-
 @pytest.mark.parametrize(
     ("model", "unused"),
     [
@@ -137,7 +119,7 @@ every = 0.001
     ],
 )
 def test_a_run_loads_nothing_that_draws_and_no_fft_where_there_is_no_grid(tmp_path, model, unused):
-    (tmp_path / "rod.toml").write_text(RUN.replace("MODEL", model))
+    (tmp_path / "rod.toml").write_text(BENT.replace('model = "rft"', model))
     code = f"""
 import sys
 sys.path.insert(0, {str(ROOT)!r})

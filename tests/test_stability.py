@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 
 import pytest
 from extremes import PLACE, STRETCH
@@ -81,17 +80,6 @@ def test_too_long_a_step_is_wrong_and_that_is_predicted(tmp_path):
     assert long.predicted == "wrong"
     assert (short.kind, short.predicted) == ("stable", "")
     assert long.numbers["place"] > 3 * short.numbers["place"]
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder with a case; what the command sets for its threads is undone."""
-    before = dict(os.environ)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bent.toml").write_text(BENT)
-    yield tmp_path
-    os.environ.clear()
-    os.environ.update(before)
 
 
 def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):

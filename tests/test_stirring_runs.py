@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import STOKES, rms, run, scene, slopes, twisting_rod
+from scenes import RIBBON, STOKES, rms, run, scene, slopes, twisting_rod
 
 from ibfil.case import Case, parse_case
 from ibfil.geometry import Geometry
@@ -50,19 +50,6 @@ def test_the_explicit_scheme_finds_the_same_path():
         assert 0.9 < slopes(errors)[0] < 1.5
 
 
-RIBBON: dict[str, Any] = {
-    "length": 1.0,
-    "nodes": 11,
-    "bending": [1.0, 0.5],
-    "twisting": 0.7,
-    "stretching": 400.0,
-    "radius": 0.05,
-    "curvature": ["6*sin(2*pi*s - 10*t)", "3*cos(10*t)"],
-    "twist_rate": "5*sin(10*t)",
-    "shape": {"kind": "relaxed"},
-    "normal": [0, 1, 0],
-    "start": {"end": "clamped", "spin": 15.0},
-}
 GRID: dict[str, Any] = {"model": "stokes", "box": [1.6, 2.0, 2.4], "cells": [16, 20, 24], "rotation": "grid"}
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 
 import pytest
 from made_run import BENT
@@ -14,17 +13,6 @@ from ibfil.errors import CaseError
 from ibfil.record import RunFile
 from ibfil.study import axis, axis_of, combinations, write_csv, write_json
 from ibfil.sweep import sweep
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder with a case; what the command sets for its threads is undone."""
-    before = dict(os.environ)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bent.toml").write_text(BENT)
-    yield tmp_path
-    os.environ.clear()
-    os.environ.update(before)
 
 
 def test_an_axis_reads_values_with_commas_of_their_own():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import signal
 from dataclasses import replace
 
@@ -23,17 +22,6 @@ from ibfil.trade import front, trade
 WAVE = BENT.replace('kind = "circle", curvature = 1.0', 'kind = "relaxed"').replace(
     "bending = 1.0", 'bending = 1.0\ncurvature = ["2*sin(6*t + 3*s)", 0]'
 )  # smooth from the start on: bent as it wants to be
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder with a case; what the command sets for its threads is undone."""
-    before = dict(os.environ)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bent.toml").write_text(BENT)
-    yield tmp_path
-    os.environ.clear()
-    os.environ.update(before)
 
 
 def quiet(line: str) -> None:

@@ -2,24 +2,9 @@
 
 from __future__ import annotations
 
-import os
-
-import pytest
 from made_run import BENT
 
 from ibfil import cli, running
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder with a case; what the command sets for its threads is undone."""
-    before = dict(os.environ)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bent.toml").write_text(BENT)
-    yield tmp_path
-    os.environ.clear()
-    os.environ.update(before)
-
 
 TWO = (
     BENT
