@@ -76,24 +76,3 @@ def cross_in(f, flow, fastest):
                 f[1, i, j, k] = c * p - a * r + g * u - d * w
                 f[2, i, j, k] = a * q - b * p + d * v - e * u
     return fastest
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def projected(modes, kx, ky, kz, fx, fy, fz, scale, out):
-    """scale P of modes (3, nx, ny, 2 (nz//2 + 1)), filtered, into ``out``; pairs of reals, kz and fz twice each."""
-    nx, ny, nz = out.shape[1:]
-    for i in range(nx):
-        for j in range(ny):
-            a, b, s = kx[i], ky[j], scale * fx[i] * fy[j]
-            d = a * a + b * b
-            for k in range(nz):
-                u, v, w = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
-                square = d + kz[k] * kz[k]
-                p = (a * u + b * v + kz[k] * w) / square if square != 0.0 else 0.0
-                g = s * fz[k]
-                out[0, i, j, k] = g * (u - a * p)
-                out[1, i, j, k] = g * (v - b * p)
-                out[2, i, j, k] = g * (w - kz[k] * p)
-    for x in range(3):
-        for k in range(2):
-            out[x, 0, 0, k] = 0.0

@@ -11,7 +11,8 @@ N(U + u') - N(U).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from .fluid import Response
 from .grid import Grid, interpolate
 from .immersed import Flow, Immersed, ImmersedResponse, Nodes
 from .past import Past, Weights, weights
-from .slab import Slab
+from .slab import Block, Slab
 from .stokes import Tabulated
 from .torque_coupling import half_curl
 from .transforms import VectorTransform
@@ -54,31 +55,39 @@ class Background:
 
 
 class Room:
-    """Where fields are transformed; what it holds does not outlive a call, so others may use it too.
+    """Where fields are transformed; what it holds does not outlive a call, so others may use ``flow`` too.
 
-    ``flow`` has FIELDS components. ``spin`` is there where nodes stir the fluid (torque_coupling.py).
+    ``flow`` has FIELDS components. ``vectors`` of a node go through the grid: its force, and with two its torque.
     """
 
-    def __init__(self, flow: VectorTransform, spin: VectorTransform | None, grid: Grid, threads: int = 1) -> None:
-        self.flow, self._spin = flow, spin
-        self._slabs = [Slab(room, threads) for room in (flow, spin) if room is not None]
-        self.modes = flow.modes[:3]
-        self.reals = self.modes.view(float)
-        self._k, _ = grid.wave_numbers()
+    def __init__(self, grid: Grid, vectors: int = 1, threads: int = 1) -> None:
+        nx, ny, nz = (int(n) for n in grid.cells)
+        self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS)
+        self._slab = Slab((nx, ny, nz), 3 * vectors, threads)
+        self._stirs = vectors == 2
+        (self._kx, self._ky, self._kz), _ = grid.wave_numbers()
 
-    def put(self, nodes: Nodes, vectors: np.ndarray) -> None:
-        """Leaves the modes of what nodes put onto the grid: forces (n, 3), or forces and torques (n, 6)."""
-        for k, slab in enumerate(self._slabs):
-            slab.put(nodes, vectors[:, 3 * k : 3 * k + 3])
-        if self._spin is not None:
-            half_curl(self._spin.modes, *self._k, self.modes)
+    def _half_curl(self, block: Block, source: np.ndarray, target: np.ndarray) -> None:
+        kx, ky = self._kx[block.i : block.i + source.shape[1]], self._ky[block.j : block.j + source.shape[2]]
+        half_curl(source, kx, ky, self._kz, target)
 
-    def take(self, nodes: Nodes) -> np.ndarray:
-        """What nodes feel of the velocity whose modes it holds: (n, 3), or half the vorticity too (n, 6)."""
-        if self._spin is not None:
-            self._spin.modes[:] = 0.0
-            half_curl(self.modes, *self._k, self._spin.modes)
-        return np.hstack([slab.take(nodes) for slab in self._slabs])
+    def put(self, nodes: Nodes, vectors: np.ndarray) -> Iterator[Block]:
+        """The modes of what nodes put onto the grid, forces (n, 3), or forces and torques (n, 6): block by block."""
+        for block in self._slab.put(nodes, vectors):
+            if self._stirs:
+                self._half_curl(block, block.modes[3:], block.modes[:3])
+            yield block
+
+    def take(self, nodes: Nodes, velocity: Callable[[Block], None]) -> np.ndarray:
+        """What nodes feel of the ``velocity`` that is put into each block: (n, 3), or half its vorticity too (n, 6)."""
+
+        def modes(block: Block) -> None:
+            velocity(block)
+            if self._stirs:
+                block.modes[3:] = 0.0
+                self._half_curl(block, block.modes[:3], block.modes[3:])
+
+        return self._slab.take(nodes, modes)
 
 
 class _Asked(NamedTuple):
@@ -102,13 +111,12 @@ class NavierStokes:
         room: Room,
         background: Background | None = None,
     ) -> None:
-        self.fluid, self.density, self.past = fluid, density, Past(fluid.grid)
+        self.fluid, self.density, self.past = fluid, density, Past(fluid.grid, density, fluid.viscosity)
         self._make, self.room, self._background = operator, room, background
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: _Asked | None = None
         self.time = 0.0
         self.fastest = 0.0 if background is None else float(np.abs(background.at(0.0)[:3]).max())
-        self._waves, _ = fluid.grid.wave_numbers()
 
     def _operator(self, alpha: float) -> tuple[float, Tabulated]:
         """The operator of alpha, or of one that is the same but for round-off."""
@@ -123,10 +131,9 @@ class NavierStokes:
         alpha, operator = self._operator(self.density / tau)
         response = operator.response(r, e3, time, tau)
         past = weights(alpha, tau, w, self.past.dt_old)
-        self.past.coast(past, self.fluid.viscosity, self.room.reals)
-        if self.past.dt_old > 0:
-            u0 = self.fluid.coupling.drop(response.nodes.axes, self.room.take(response.nodes))
-            response.flow = u0 if response.flow is None else response.flow + u0
+        felt = self.room.take(response.nodes, partial(self.past.coast, past))
+        u0 = self.fluid.coupling.drop(response.nodes.axes, felt)
+        response.flow = u0 if response.flow is None else response.flow + u0
         self._asked = _Asked(response, past)
         return response
 
@@ -134,23 +141,21 @@ class NavierStokes:
         """The velocity at the end of the step, and its advection. Raises ValueError for a step not asked for last."""
         if self._asked is None or response is not self._asked.response:
             raise ValueError("a step that is taken must be the one the fluid was asked for last")
-        fluid, room, nodes, past = self.fluid, self.room, self._asked.response.nodes, self._asked.weights
-        room.put(nodes, fluid.coupling.lift(nodes.axes, force))
-        self.past.push(past, fluid.viscosity, room.reals, 1.0 / (room.flow.size * fluid.grid.spacing**3))
+        nodes, past = self._asked.response.nodes, self._asked.weights
+        for block in self.room.put(nodes, self.fluid.coupling.lift(nodes.axes, force)):
+            self.past.push(past, block, self.room.flow.modes)
         self.time += past.dt
-        self._advect()
+        self._advect(self.past.take_up(past))
 
-    def _advect(self) -> None:
-        """The advection of the velocity that the transform holds, filtered."""
+    def _advect(self, out: np.ndarray) -> None:
+        """Into ``out``, the modes of omega x u, of the velocity and vorticity whose modes the transform holds."""
         t = self.room.flow
-        curl(t.modes, *self._waves)
         t.backward(FIELDS)
         if self._background is None:
             self.fastest = cross(t.real, 0.0)
         else:
             self.fastest = cross_in(t.real, self.background(), 0.0)
-        t.forward()
-        self.past.advect(self.room.reals, self.density / t.size)
+        t.forward(into=out)
 
     def background(self) -> np.ndarray:
         """Velocity and vorticity (6, nx, ny, nz) of the maintained flow now, which there must be; filtered."""
@@ -166,7 +171,7 @@ class NavierStokes:
     ) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it; it is the fluid's present one."""
         fluid = self.fluid
-        self.room.reals[:] = self.past.now
+        self.room.flow.modes[:3] = self.past.now
         u = interpolate(*fluid.stencil(points), self.room.flow.backward())
         return u if fluid.flow is None else u + fluid.flow(points, time)
 

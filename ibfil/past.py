@@ -5,19 +5,23 @@
     Euler   b = 1, 0                                     c = -(1 + w/2), w/2
     BDF2    b = (1 + w)^2/(1 + 2 w), -w^2/(1 + 2 w)      c = -(1 + w), w,            w = dt/dt_old
 
-the same discretisation of time as the rods' (stepping.py). N is rho div(u u), projected (advection.py). The mean mode
-is zero: a uniform back pressure carries any net force, so the fluid keeps the momentum it began with, none.
+the same discretisation of time as the rods' (stepping.py). N is rho (omega x u), kept as transformed: it is projected
+and filtered (advection.py) where it is used. The mean mode is zero: a uniform back pressure carries any net force, so
+the fluid keeps the momentum it began with, none.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
+import pyfftw
 from numba import njit
 
-from .advection import filters, projected
+from .advection import filters
 from .grid import Grid
+from .slab import Block
 
 
 class Weights(NamedTuple):
@@ -40,86 +44,123 @@ def weights(alpha: float, tau: float, w: float, dt_old: float) -> Weights:
     return Weights(alpha, part * (1 + w) ** 2, -part * w * w, -1.0 - w, w, tau * (1 + 2 * w) / (1 + w))
 
 
-class Past:
-    """Velocities and advection (3, nx, ny, 2 (nz//2 + 1)) at the last two steps, pairs of reals a mode.
+def _fields(count: int, shape: tuple[int, ...]) -> list[np.ndarray]:
+    """Zeros, aligned for FFTW, each field nine cache lines further into its page.
 
-    Real multipliers are then loops over plain reals, which compilers vectorise.
+    All in the same place would share few lines of the first cache where the grid's extents are powers of two, and a
+    loop over all of them would take a third longer.
+    """
+    size, shift = math.prod(shape), 9 * 64 // 16
+    rooms = [pyfftw.zeros_aligned(size + count * shift, complex) for _ in range(count)]
+    return [room[k * shift : k * shift + size].reshape(shape) for k, room in enumerate(rooms)]
+
+
+class Past:
+    """Velocities and advection (3, nx, ny, nz//2 + 1) at the last two steps.
+
+    Loops go over pairs of reals, which compilers vectorise, as all multipliers are real.
     """
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: Grid, density: float, viscosity: float) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
-        self.now, self.old, self.n_now, self.n_old = (np.zeros((3, nx, ny, 2 * (nz // 2 + 1))) for _ in range(4))
-        self._ahead = np.zeros_like(self.now)  # what the last step asked about would come to without forces
-        fx, fy, fz = filters(grid)
-        self._f = (fx, fy, np.repeat(fz, 2))
-        self.dt_old = 0.0
+        fields = _fields(5, (3, nx, ny, nz // 2 + 1))
+        self.now, self.old, self.n_now, self.n_old = fields[:4]
+        self._ahead = fields[4]  # what the step asked about last would come to without forces
         (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
-        self._k, self._s = (kx, ky, np.repeat(kz, 2)), (sx, sy, np.repeat(sz, 2))
+        fx, fy, fz = filters(grid)
+        self._waves = (kx, ky, np.repeat(kz, 2), viscosity * sx, viscosity * sy, viscosity * np.repeat(sz, 2))
+        self._filters = (fx, fy, np.repeat(fz, 2))
+        self._scale, self._force_scale = density / (nx * ny * nz), 1.0 / (nx * ny * nz * grid.spacing**3)
+        self.dt_old = 0.0
 
-    def coast(self, w: Weights, viscosity: float, out: np.ndarray) -> None:
-        """Into ``out`` the velocity's modes, as pairs of reals, at the end of a step without forces."""
-        past = (self._ahead, self.now, self.old, self.n_now, self.n_old)
-        _coast(out, *past, *self._s, w.alpha, viscosity, w.now, w.old, w.n_now, w.n_old)
+    def coast(self, w: Weights, block: Block) -> None:
+        """Into the first three fields of the block: the velocity at the end of a step without forces."""
+        fields = (self._ahead, self.now, self.old, self.n_now, self.n_old)
+        c, c_old = w.n_now * self._scale, w.n_old * self._scale
+        reals = (field.view(float) for field in (block.modes, *fields))
+        _coast(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, w.now, w.old, c, c_old)
 
-    def push(self, w: Weights, viscosity: float, modes: np.ndarray, scale: float) -> None:
-        """Takes the step last asked about: the force density's modes times 1/scale, as pairs of reals, act over it.
+    def push(self, w: Weights, block: Block, flow: np.ndarray) -> None:
+        """Adds what the forces, whose modes are in the block, do in the step asked about last.
 
-        Leaves u there, filtered.
+        Leaves the velocity, filtered, and its vorticity in ``flow`` (6, nx, ny, nz//2 + 1).
         """
-        _push(modes, self._ahead, self.old, *self._k, *self._s, *self._f, w.alpha, viscosity, scale)
-        self.now, self.old = self.old, self.now
-        self.n_now, self.n_old = self.n_old, self.n_now  # the newest advection is yet to be written into n_now
-        self.dt_old = w.dt
+        reals = (field.view(float) for field in (block.modes, self._ahead, flow))
+        _push(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, self._force_scale)
 
-    def advect(self, modes: np.ndarray, scale: float) -> None:
-        """Takes up the advection of the newest velocity: scale times the modes, as pairs of reals."""
-        projected(modes, *self._k, *self._f, scale, self.n_now)
+    def take_up(self, w: Weights) -> np.ndarray:
+        """The step asked about last, all of it pushed, is the newest. Returns room for the modes of its omega x u."""
+        self.now, self.old, self._ahead = self._ahead, self.now, self.old
+        self.n_now, self.n_old = self.n_old, self.n_now
+        self.dt_old = w.dt
+        return self.n_now
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """All of it; nothing before the first step."""
         if self.dt_old == 0.0:
             return {}
-        return {"now": self.now, "old": self.old, "n_now": self.n_now, "n_old": self.n_old, "dt_old": self.dt_old}
+        kept = {name: getattr(self, name).view(float) for name in ("now", "old", "n_now", "n_old")}
+        return {**kept, "dt_old": self.dt_old}
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:
         """Takes up what ``memory`` gave."""
         for name in ("now", "old", "n_now", "n_old"):
-            getattr(self, name)[:] = memory[name]
+            getattr(self, name).view(float)[:] = memory[name]
         self.dt_old = float(memory["dt_old"])
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _coast(out, ahead, now, old, n_now, n_old, sx, sy, sz, alpha, viscosity, b, b_old, c, c_old):
-    nx, ny, nz = now.shape[1:]
-    for x in range(3):
-        for i in range(nx):
-            for j in range(ny):
-                s = alpha + viscosity * (sx[i] + sy[j])
-                for k in range(nz):
-                    f = b * now[x, i, j, k] + b_old * old[x, i, j, k]
-                    f += c * n_now[x, i, j, k] + c_old * n_old[x, i, j, k]
-                    u = f / (s + viscosity * sz[k])
-                    ahead[x, i, j, k] = out[x, i, j, k] = u
+def _coast(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, b, b_old, c, c_old):
+    """Pairs of reals a mode; kz, sz and fz twice each. s has the viscosity in it."""
+    for i in range(i0, i0 + out.shape[1]):
+        for j in range(j0, j0 + out.shape[2]):
+            s, d, e = alpha + sx[i] + sy[j], kx[i] * kx[i] + ky[j] * ky[j], fx[i] * fy[j]
+            p, q = kx[i], ky[j]
+            for k in range(out.shape[3]):
+                u = c * n_now[0, i, j, k] + c_old * n_old[0, i, j, k]
+                v = c * n_now[1, i, j, k] + c_old * n_old[1, i, j, k]
+                w = c * n_now[2, i, j, k] + c_old * n_old[2, i, j, k]
+                square = d + kz[k] * kz[k]
+                g = (p * u + q * v + kz[k] * w) / square if square != 0.0 else 0.0
+                f, r = e * fz[k], 1.0 / (s + sz[k])
+                u = r * (b * now[0, i, j, k] + b_old * old[0, i, j, k] + f * (u - p * g))
+                v = r * (b * now[1, i, j, k] + b_old * old[1, i, j, k] + f * (v - q * g))
+                w = r * (b * now[2, i, j, k] + b_old * old[2, i, j, k] + f * (w - kz[k] * g))
+                ahead[0, i, j, k] = out[0, i - i0, j - j0, k] = u
+                ahead[1, i, j, k] = out[1, i - i0, j - j0, k] = v
+                ahead[2, i, j, k] = out[2, i - i0, j - j0, k] = w
+    if i0 == 0 and j0 == 0:
+        for x in range(3):
+            for k in range(2):
+                ahead[x, 0, 0, k] = out[x, 0, 0, k] = 0.0
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _push(modes, ahead, new, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, viscosity, scale):
-    """``new`` is ``ahead`` and what the forces add; ``modes``, the forces', become the same, filtered."""
-    nx, ny, nz = new.shape[1:]
-    for i in range(nx):
-        for j in range(ny):
-            s, d, e = alpha + viscosity * (sx[i] + sy[j]), kx[i] * kx[i] + ky[j] * ky[j], fx[i] * fy[j]
-            for k in range(nz):
-                u, v, w = modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k]
+def _push(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, scale):
+    """Adds P force / (alpha + s) to ``ahead``; into ``flow`` that, filtered, and i k x of it."""
+    for i in range(i0, i0 + force.shape[1]):
+        for j in range(j0, j0 + force.shape[2]):
+            s, d, e = alpha + sx[i] + sy[j], kx[i] * kx[i] + ky[j] * ky[j], fx[i] * fy[j]
+            p, q = kx[i], ky[j]
+            for k in range(force.shape[3]):
+                u, v, w = force[0, i - i0, j - j0, k], force[1, i - i0, j - j0, k], force[2, i - i0, j - j0, k]
                 square = d + kz[k] * kz[k]
-                p = (kx[i] * u + ky[j] * v + kz[k] * w) / square if square != 0.0 else 0.0
-                g, f = scale / (s + viscosity * sz[k]), e * fz[k]
-                u = ahead[0, i, j, k] + g * (u - kx[i] * p)
-                v = ahead[1, i, j, k] + g * (v - ky[j] * p)
-                w = ahead[2, i, j, k] + g * (w - kz[k] * p)
-                new[0, i, j, k], modes[0, i, j, k] = u, f * u
-                new[1, i, j, k], modes[1, i, j, k] = v, f * v
-                new[2, i, j, k], modes[2, i, j, k] = w, f * w
-    for x in range(3):
-        for k in range(2):
-            new[x, 0, 0, k] = modes[x, 0, 0, k] = 0.0
+                g = (p * u + q * v + kz[k] * w) / square if square != 0.0 else 0.0
+                r = scale / (s + sz[k])
+                ahead[0, i, j, k] += r * (u - p * g)
+                ahead[1, i, j, k] += r * (v - q * g)
+                ahead[2, i, j, k] += r * (w - kz[k] * g)
+            for x in range(3):
+                for k in range(force.shape[3]):
+                    flow[x, i, j, k] = e * fz[k] * ahead[x, i, j, k]
+            for k in range(0, force.shape[3], 2):
+                a, b, r = flow[0, i, j, k], flow[0, i, j, k + 1], kz[k]
+                u, v = flow[1, i, j, k], flow[1, i, j, k + 1]
+                w, g = flow[2, i, j, k], flow[2, i, j, k + 1]
+                flow[3, i, j, k], flow[3, i, j, k + 1] = r * v - q * g, q * w - r * u
+                flow[4, i, j, k], flow[4, i, j, k + 1] = p * g - r * b, r * a - p * w
+                flow[5, i, j, k], flow[5, i, j, k + 1] = q * b - p * v, p * u - q * a
+    if i0 == 0 and j0 == 0:
+        for x in range(3):
+            for k in range(2):
+                ahead[x, 0, 0, k] = flow[x, 0, 0, k] = 0.0

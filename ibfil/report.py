@@ -175,7 +175,7 @@ def memory(simulation: Simulation) -> dict[str, float]:
     if case.fluid.model == "navier-stokes":
         modes = 3 * 16.0 * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
         out["past of the fluid, as large in a checkpoint"] = 4 * modes
-        out["its transforms"] = modes + 2 * modes * (6 + 3 * (parts - 3)) / 3
+        out["its transforms"] = modes + 4 * modes
         out["mobility table"] *= 2  # of Euler's first step, and of BDF2's
     elif simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
         out["fields and their transforms"] = (parts - 2) * 2 * 3 * 8.0 * float(np.prod(cells))

@@ -148,7 +148,8 @@ def half_curl(source, kx, ky, kz, target):
 class StirredSolve:
     """Velocities and half vorticities of forces and torques, by whole FFTs (stokes.Solver).
 
-    ``alpha`` is density over time, zero in Stokes flow; ``rooms`` at hand are used, and what they held is lost.
+    ``alpha`` is density over time, zero in Stokes flow; a ``transform`` of 6 fields at hand is used, and what it held
+    is lost.
     """
 
     def __init__(
@@ -157,28 +158,30 @@ class StirredSolve:
         viscosity: float,
         threads: int = 1,
         alpha: float = 0.0,
-        rooms: tuple[VectorTransform, VectorTransform] | None = None,
+        transform: VectorTransform | None = None,
     ) -> None:
         self.grid, self.viscosity, self.alpha = grid, viscosity, alpha
         nx, ny, nz = (int(n) for n in grid.cells)
-        self._flow, self._spin = rooms or [VectorTransform((nx, ny, nz), threads) for _ in range(2)]
+        self._transform = transform or VectorTransform((nx, ny, nz), threads, fields=6)
         self._k, (sx, sy, sz) = grid.wave_numbers()
         kx, ky, kz = self._k
         self._waves = (kx, ky, np.repeat(kz, 2), sx, sy, np.repeat(sz, 2))
-        self._scale = 1.0 / (self._flow.size * grid.spacing**3)
+        self._scale = 1.0 / (self._transform.size * grid.spacing**3)
 
     def velocity(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Velocity and half the vorticity (n, 6) at the nodes, of their forces and torques (n, 6)."""
-        for transform, part in ((self._flow, force[:, :3]), (self._spin, force[:, 3:])):
-            transform.real[:3] = 0.0
-            spread(base, weights, part, transform.real)
-            transform.forward()
-        flow, spin = self._flow.modes[:3], self._spin.modes
+        t = self._transform
+        t.real[:] = 0.0
+        spread(base, weights, force[:, :3], t.real[:3])
+        spread(base, weights, force[:, 3:], t.real[3:])
+        t.forward(6)
+        flow, spin = t.modes[:3], t.modes[3:]
         half_curl(spin, *self._k, flow)
-        project(flow.view(float)[:3], *self._waves, self.alpha, self.viscosity, self._scale)
+        project(flow.view(float), *self._waves, self.alpha, self.viscosity, self._scale)
         spin[:] = 0.0
         half_curl(flow, *self._k, spin)
-        return np.hstack([interpolate(base, weights, t.backward()) for t in (self._flow, self._spin)])
+        t.backward(6)
+        return np.hstack([interpolate(base, weights, t.real[:3]), interpolate(base, weights, t.real[3:])])
 
 
 def spin_mobility(radius: np.ndarray, widest: float, slip: float, viscosity: float, volume: np.ndarray) -> np.ndarray:

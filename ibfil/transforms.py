@@ -92,11 +92,13 @@ class VectorTransform:
         self.real[:] = 0.0
         self.modes[:] = 0.0
 
-    def forward(self, fields: int = 3) -> np.ndarray:
-        """``modes`` of the first ``fields`` of ``real``."""
-        for plan in self._forward[:fields]:
+    def forward(self, fields: int = 3, into: np.ndarray | None = None) -> np.ndarray:
+        """``modes`` of the first ``fields`` of ``real``, or ``into`` another array like them, aligned like them."""
+        modes = self.modes if into is None else into
+        for c, plan in enumerate(self._forward[:fields]):
+            plan.update_arrays(self.real[c], modes[c])
             plan.execute()
-        return self.modes
+        return modes
 
     def backward(self, fields: int = 3) -> np.ndarray:
         """``real`` of the first ``fields`` of ``modes``, times the number of cells."""

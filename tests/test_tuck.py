@@ -19,9 +19,8 @@ from ibfil.fluid import Held
 from ibfil.grid import Grid
 from ibfil.immersed import Immersed
 from ibfil.kernels import KERNELS
-from ibfil.navier_stokes import FIELDS, NavierStokes, Room
+from ibfil.navier_stokes import NavierStokes, Room
 from ibfil.stokes import StokesByTable
-from ibfil.transforms import VectorTransform
 
 TALL, AMPLITUDE = 2, 0.05  # H in wavelengths, k b
 
@@ -32,7 +31,7 @@ def pumped(reynolds: float, cells: int, periods: int, steps: int) -> float:
     h = 2 * np.pi / cells
     grid = Grid([2 * np.pi, 2 * np.pi * TALL, h], shape)
     made = Immersed(grid, KERNELS["peskin4"], 1.0, np.zeros(cells), None)
-    room = Room(VectorTransform(shape, fields=FIELDS), None, grid)
+    room = Room(grid)
     fluid = NavierStokes(made, reynolds, lambda alpha: StokesByTable(made, alpha), room)
     s, zero = h * np.arange(cells), np.zeros((cells, 3))
     dt, forces, speeds = 2 * np.pi / steps, [], []
@@ -45,7 +44,7 @@ def pumped(reynolds: float, cells: int, periods: int, steps: int) -> float:
         fluid.advance(response, answer.force)
         if m > steps * (periods - 1):
             forces.append(answer.force[:, 0].sum())
-            u = np.fft.irfftn(fluid.past.now.view(complex), shape, axes=(1, 2, 3)) * np.prod(shape)
+            u = np.fft.irfftn(fluid.past.now, shape, axes=(1, 2, 3)) * np.prod(shape)
             speeds.append(u[0, :, 0].mean())  # half way between the sheets
     height = 2 * np.pi * TALL
     back = np.mean(forces) * height**2 / (8 * np.prod(grid.box))
