@@ -60,10 +60,12 @@ def save(fig: Figure, path: Path) -> None:
 
 
 def _few_ticks(axes: Axes) -> None:
-    """On an axis of little more than a decade: 1, 2, 5 with plain numbers."""
+    """On an axis of little more than a decade: 1, 2, 5 with plain numbers; room on both sides of a single point."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axes.get_xlim()
+    if high < 1.1 * low:  # matplotlib takes what rounding makes of one point for two
+        axes.set_xlim(low := low / 3, high := high * 3)
     if high < 50 * low:
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, place: f"{x:g}"))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_run import BENT
 
-from ibfil import cli, reference
+from ibfil import cli, reference, trade_figure
 from ibfil.distance import superpose
 from ibfil.errors import CaseError, Interrupted, RunFailed
 from ibfil.members import run_members
@@ -166,6 +166,17 @@ def test_what_the_reference_cannot_tell_is_marked_and_counts_against_a_setting(t
     assert made.cheapest(coarse.errors["position"] + 1.01 * own) is not None
     exact = replace(coarse, errors={"position": 0.0})
     assert replace(made, tried=(exact,)).cheapest(0.9 * own) is None
+
+
+def test_one_setting_alone_has_room_in_the_figure(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(trade_figure, "save", lambda figure, path: drawn.append(figure))
+    made = trade(BENT, [axis("time.step=1e-3")], tmp_path, repeat=1, observe=["position"], say=quiet)
+    for seconds in (0.08, 3.0, 5.0, 12.0):
+        trade_figure.draw(replace(made, tried=(replace(made.tried[0], seconds=(seconds,)),)), tmp_path / "trade.png")
+        low, high = drawn[-1].axes[0].get_xlim()
+        assert low < 0.9 * seconds
+        assert 1.1 * seconds < high
 
 
 @pytest.mark.parametrize("words", [["--observe", "nothing"], ["--budget", "ten"], ["--repeat", "0"], ["--for", "-1"]])
