@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from . import stokes
 from .navier_stokes import Background, NavierStokes, Room
 from .torque_coupling import StirredSolve
@@ -19,16 +21,17 @@ def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> Navi
     ``worth``: what a preconditioner of krylov costs, in velocity evaluations.
     """
     threads = case.compute.threads
-    room = Room(made.grid, made.coupling.vectors, threads)
+    room = Room(made.grid, made.coupling.vectors, threads, made.number)
+    shared = room.flow if made.number is np.float64 else None  # solvers by FFT are exact to round-off
 
     def operator(alpha: float) -> stokes.Tabulated:
         if method == "table":
             return stokes.StokesByTable(made, alpha)
         solver: stokes.Solver
         if made.coupling.vectors == 1:
-            solver = stokes.StokesSolve(made.grid, made.viscosity, threads, alpha=alpha, transform=room.flow)
+            solver = stokes.StokesSolve(made.grid, made.viscosity, threads, alpha=alpha, transform=shared)
         else:
-            solver = StirredSolve(made.grid, made.viscosity, threads, alpha, room.flow)
+            solver = StirredSolve(made.grid, made.viscosity, threads, alpha, shared)
         if method == "krylov":
             return stokes.StokesByKrylov(made, solver, worth, alpha)
         return stokes.StokesByFFT(made, solver, alpha)

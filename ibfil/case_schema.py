@@ -117,7 +117,7 @@ class Fluid(Table):
     method: Literal["auto", "fft", "pruned", "table", "averaged", "krylov"] = Field(
         "auto", description="how velocities are found; auto decides by counts"
     )
-    precision: Literal["double", "single"] = Field("double", description="of fields and table")
+    precision: Literal["double", "single"] = Field("double", description="of the table, and of fields with inertia")
     rotation: Literal["local", "grid"] = Field(
         "local", description="e1 turns against the rod's own drag, or by torque coupling; needs twisting"
     )

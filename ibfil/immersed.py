@@ -83,7 +83,8 @@ class Immersed:
 
     The drag is that of rods whose turns do not go through the grid; None where nothing twists or all goes through it.
     ``rods`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is
-    the type of the mobility table's numbers, float or single precision (relative error about 1e-7).
+    the type of the mobility table's numbers and of the fields of a fluid with inertia, double or single precision
+    (relative error about 1e-7).
     """
 
     grid: Grid

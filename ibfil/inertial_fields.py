@@ -26,7 +26,7 @@ class InertialFields(GridFields):
         self._fluid = fluid
 
     def _velocity(self, force: np.ndarray) -> np.ndarray:
-        return self._fluid.past.now.copy()
+        return self._fluid.past.now.astype(complex)
 
     def _pressure(self, force: np.ndarray) -> np.ndarray:
         return super()._pressure(force) - self._dynamic().astype(np.float32)

@@ -60,10 +60,10 @@ class Room:
     ``flow`` has FIELDS components. ``vectors`` of a node go through the grid: its force, and with two its torque.
     """
 
-    def __init__(self, grid: Grid, vectors: int = 1, threads: int = 1) -> None:
+    def __init__(self, grid: Grid, vectors: int = 1, threads: int = 1, number: type = np.float64) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
-        self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS)
-        self._slab = Slab((nx, ny, nz), 3 * vectors, threads)
+        self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS, number=number)
+        self._slab = Slab((nx, ny, nz), 3 * vectors, threads, number)
         self._stirs = vectors == 2
         (self._kx, self._ky, self._kz), _ = grid.wave_numbers()
 
@@ -111,7 +111,7 @@ class NavierStokes:
         room: Room,
         background: Background | None = None,
     ) -> None:
-        self.fluid, self.density, self.past = fluid, density, Past(fluid.grid, density, fluid.viscosity)
+        self.fluid, self.density, self.past = fluid, density, Past(fluid.grid, density, fluid.viscosity, fluid.number)
         self._make, self.room, self._background = operator, room, background
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: _Asked | None = None

@@ -22,6 +22,7 @@ from numba import njit
 from .advection import filters
 from .grid import Grid
 from .slab import Block
+from .transforms import modes_of
 
 
 class Weights(NamedTuple):
@@ -44,26 +45,27 @@ def weights(alpha: float, tau: float, w: float, dt_old: float) -> Weights:
     return Weights(alpha, part * (1 + w) ** 2, -part * w * w, -1.0 - w, w, tau * (1 + 2 * w) / (1 + w))
 
 
-def _fields(count: int, shape: tuple[int, ...]) -> list[np.ndarray]:
+def _fields(count: int, shape: tuple[int, ...], dtype: np.dtype) -> list[np.ndarray]:
     """Zeros, aligned for FFTW, each field nine cache lines further into its page.
 
     All in the same place would share few lines of the first cache where the grid's extents are powers of two, and a
     loop over all of them would take a third longer.
     """
-    size, shift = math.prod(shape), 9 * 64 // 16
-    rooms = [pyfftw.zeros_aligned(size + count * shift, complex) for _ in range(count)]
+    size, shift = math.prod(shape), 9 * 64 // dtype.itemsize
+    rooms = [pyfftw.zeros_aligned(size + count * shift, dtype) for _ in range(count)]
     return [room[k * shift : k * shift + size].reshape(shape) for k, room in enumerate(rooms)]
 
 
 class Past:
     """Velocities and advection (3, nx, ny, nz//2 + 1) at the last two steps.
 
-    Loops go over pairs of reals, which compilers vectorise, as all multipliers are real.
+    Kept in the type ``number``, double or single precision, and computed in double. Loops go over pairs of reals, which
+    compilers vectorise, as all multipliers are real.
     """
 
-    def __init__(self, grid: Grid, density: float, viscosity: float) -> None:
+    def __init__(self, grid: Grid, density: float, viscosity: float, number: type = np.float64) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
-        fields = _fields(5, (3, nx, ny, nz // 2 + 1))
+        fields = _fields(5, (3, nx, ny, nz // 2 + 1), modes_of(number))
         self.now, self.old, self.n_now, self.n_old = fields[:4]
         self._ahead = fields[4]  # what the step asked about last would come to without forces
         (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
@@ -71,13 +73,13 @@ class Past:
         self._waves = (kx, ky, np.repeat(kz, 2), viscosity * sx, viscosity * sy, viscosity * np.repeat(sz, 2))
         self._filters = (fx, fy, np.repeat(fz, 2))
         self._scale, self._force_scale = density / (nx * ny * nz), 1.0 / (nx * ny * nz * grid.spacing**3)
-        self.dt_old = 0.0
+        self._real, self.dt_old = np.dtype(number), 0.0
 
     def coast(self, w: Weights, block: Block) -> None:
         """Into the first three fields of the block: the velocity at the end of a step without forces."""
         fields = (self._ahead, self.now, self.old, self.n_now, self.n_old)
         c, c_old = w.n_now * self._scale, w.n_old * self._scale
-        reals = (field.view(float) for field in (block.modes, *fields))
+        reals = [field.view(self._real) for field in (block.modes, *fields)]
         _coast(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, w.now, w.old, c, c_old)
 
     def push(self, w: Weights, block: Block, flow: np.ndarray) -> None:
@@ -85,7 +87,7 @@ class Past:
 
         Leaves the velocity, filtered, and its vorticity in ``flow`` (6, nx, ny, nz//2 + 1).
         """
-        reals = (field.view(float) for field in (block.modes, self._ahead, flow))
+        reals = [field.view(self._real) for field in (block.modes, self._ahead, flow)]
         _push(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, self._force_scale)
 
     def take_up(self, w: Weights) -> np.ndarray:
@@ -99,13 +101,13 @@ class Past:
         """All of it; nothing before the first step."""
         if self.dt_old == 0.0:
             return {}
-        kept = {name: getattr(self, name).view(float) for name in ("now", "old", "n_now", "n_old")}
+        kept = {name: getattr(self, name).view(self._real) for name in ("now", "old", "n_now", "n_old")}
         return {**kept, "dt_old": self.dt_old}
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:
         """Takes up what ``memory`` gave."""
         for name in ("now", "old", "n_now", "n_old"):
-            getattr(self, name).view(float)[:] = memory[name]
+            getattr(self, name).view(self._real)[:] = memory[name]
         self.dt_old = float(memory["dt_old"])
 
 

@@ -173,7 +173,7 @@ def memory(simulation: Simulation) -> dict[str, float]:
     else:
         out["dense matrices"] = costs.dense_bytes(n, parts)
     if case.fluid.model == "navier-stokes":
-        modes = 3 * 16.0 * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
+        modes = 3 * 2 * number * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
         out["past of the fluid, as large in a checkpoint"] = 4 * modes
         out["its transforms"] = modes + 4 * modes
         out["mobility table"] *= 2  # of Euler's first step, and of BDF2's

@@ -16,7 +16,7 @@ import pyfftw
 
 from .grid import interpolate, spread
 from .pruned import run_of_cells
-from .transforms import useful_threads
+from .transforms import modes_of, useful_threads
 
 if TYPE_CHECKING:
     from .immersed import Nodes
@@ -62,10 +62,15 @@ class _Cut(NamedTuple):
 
 
 class Slab:
-    """Takes ``fields`` components of what nodes put onto a grid of ``cells`` to modes, and modes to what nodes feel."""
+    """Takes ``fields`` components of what nodes put onto a grid of ``cells`` to modes, and modes to what nodes feel.
 
-    def __init__(self, cells: tuple[int, int, int], fields: int = 3, threads: int = 1) -> None:
-        self._cells, self._fields, self._threads = cells, fields, threads
+    ``number`` is the type of the fields, double or single precision.
+    """
+
+    def __init__(
+        self, cells: tuple[int, int, int], fields: int = 3, threads: int = 1, number: type = np.float64
+    ) -> None:
+        self._cells, self._fields, self._threads, self._number = cells, fields, threads, number
         self._planes: dict[tuple[int, int], _Planes] = {}
         self._lines = cache(self._make_lines)
 
@@ -84,7 +89,7 @@ class Slab:
         while other % lines:
             lines -= 1
         shape = (nx, lines) if axis == 0 else (lines, ny)
-        room = pyfftw.zeros_aligned((self._fields, *shape, nz // 2 + 1), dtype=complex)
+        room = pyfftw.zeros_aligned((self._fields, *shape, nz // 2 + 1), dtype=modes_of(self._number))
         return room, *(self._plan(room, room, (1 + axis,), d) for d in ("FFTW_FORWARD", "FFTW_BACKWARD"))
 
     def _room(self, axis: int, count: int) -> _Planes:
@@ -92,8 +97,8 @@ class Slab:
         if found is None:
             nx, ny, nz = self._cells
             shape = (self._fields, count, ny) if axis == 0 else (self._fields, nx, count)
-            real = pyfftw.zeros_aligned((*shape, nz))
-            modes = pyfftw.zeros_aligned((*shape, nz // 2 + 1), dtype=complex)
+            real = pyfftw.zeros_aligned((*shape, nz), dtype=self._number)
+            modes = pyfftw.zeros_aligned((*shape, nz // 2 + 1), dtype=modes_of(self._number))
             axes = (2 - axis, 3)
             plans = self._plan(real, modes, axes, "FFTW_FORWARD"), self._plan(modes, real, axes, "FFTW_BACKWARD")
             found = _Planes(real, modes, *plans)

@@ -55,6 +55,11 @@ def remember() -> None:
             part.unlink()
 
 
+def modes_of(number: type) -> np.dtype:
+    """The complex type whose parts are of the type ``number``."""
+    return np.result_type(number, np.complex64)
+
+
 def useful_threads(size: int, threads: int) -> int:
     """How many of ``threads`` a transform of ``size`` numbers is given: one below 80 cells a side."""
     return threads if size > _SHARED else 1
@@ -65,15 +70,20 @@ class VectorTransform:
 
     ``forward`` keeps ``real``; ``backward`` overwrites both, and leaves the normalisation 1/(nx ny nz) to the caller.
     ``planning`` is FFTW's: "FFTW_ESTIMATE" for a few transforms, "FFTW_MEASURE" for many. There may be more
-    ``fields`` than 3.
+    ``fields`` than 3. ``number`` is the type of ``real``, double or single precision.
     """
 
     def __init__(
-        self, cells: tuple[int, int, int], threads: int = 1, planning: str = "FFTW_MEASURE", fields: int = 3
+        self,
+        cells: tuple[int, int, int],
+        threads: int = 1,
+        planning: str = "FFTW_MEASURE",
+        fields: int = 3,
+        number: type = np.float64,
     ) -> None:
         nx, ny, nz = cells
-        self.real = pyfftw.zeros_aligned((fields, nx, ny, nz))
-        self.modes = pyfftw.zeros_aligned((fields, nx, ny, nz // 2 + 1), dtype=complex)
+        self.real = pyfftw.zeros_aligned((fields, nx, ny, nz), dtype=number)
+        self.modes = pyfftw.zeros_aligned((fields, nx, ny, nz // 2 + 1), dtype=modes_of(number))
         self.size = nx * ny * nz
 
         def plan(component: int, direction: str) -> pyfftw.FFTW:

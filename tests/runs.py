@@ -76,6 +76,7 @@ FLUIDS = {
     "stirred": ["fluid.model=stokes", "fluid.rotation=grid"],
     "navier-stokes": ["fluid.model=navier-stokes", "output.fields=['pressure']"],
     "navier-stokes fft": ["fluid.model=navier-stokes", "fluid.method=fft"],
+    "navier-stokes single": ["fluid.model=navier-stokes", "fluid.precision=single"],
     "navier-stokes krylov": ["fluid.model=navier-stokes", "fluid.method=krylov", "fluid.rotation=grid"],
 }
 SCHEMES = {

@@ -57,7 +57,7 @@ def test_a_part_there_is_not_is_refused():
 def test_json_is_json(monkeypatch, capsys):
     row = bench.Row("a", 2.0, "b", 1.0, 2.0, None)
     for name in ("rft_step", "table_pair", "inertia", "start_up"):
-        monkeypatch.setattr(bench, name, lambda *a: row)
+        monkeypatch.setattr(bench, name, lambda *_, **__: row)
     monkeypatch.setattr(bench, "evaluations", lambda *a: [row])
     monkeypatch.setattr(bench, "swimmers", lambda: [row])
     assert bench.main(json=True) == 0
