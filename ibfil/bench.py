@@ -283,7 +283,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         start_up(),
     ],
     "swimmer": lambda: swimmers(),
-    "large": lambda: evaluations(256, (1.3, 1 / 6)),
+    "large": lambda: [inertia(128), *evaluations(256, (1.3, 1 / 6))],
     "threads": threads,
     "many": lambda: many(),
 }
