@@ -17,6 +17,7 @@ import numpy as np
 from . import assemble_grid, assemble_laws, costs, rft, shape_copies, shapes, stepping
 from .along import alone, along, half
 from .assemble_loads import loads, number, triple
+from .case_filament import copy_name
 from .case_schema import Coefficients, Matched
 from .ends import EndOf, HeldEnds, Turn, spinning, steady, turned
 from .errors import CaseError
@@ -98,7 +99,7 @@ def _place(case: Case) -> list[Placed]:
         for k, turn, shift in shape_copies.places(filament.copies, filament.position, key, folder):
             moved = (r - filament.position) @ turn.T + shift
             turned = tuple(None if t is None else turn @ t for t in held)
-            out.append(Placed(f"{name}_{k:03d}", filament, s, moved, e1 @ turn.T, turned))
+            out.append(Placed(copy_name(name, k), filament, s, moved, e1 @ turn.T, turned))
     return out
 
 

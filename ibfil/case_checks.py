@@ -13,6 +13,7 @@ from itertools import pairwise
 from .case_checks_filament import check_filament
 from .case_checks_size import check_size
 from .case_faults import Fault, shown
+from .case_filament import copy_name, single
 from .case_schema import Coefficients, Fluid, Matched, Observe, Scene
 from .expressions import ExpressionError, suggestion
 
@@ -256,8 +257,12 @@ def _observe(case: Scene) -> Iterator[Fault]:
 
 
 def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
-    filament = case.filaments.get(entry.filament)
-    if filament is None:
+    filament = single(case.filaments, entry.filament)
+    if filament is None and entry.filament in case.filaments:
+        if entry.kind != "dissipation":  # of all together
+            found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
+            yield Fault(f"{key}.filament", found, f'a copy by its name, "{name}" being the first', ("filament",))
+    elif filament is None:
         found = shown(entry.filament) + suggestion(entry.filament, case.filaments) if entry.filament else "nothing"
         yield Fault(f"{key}.filament", found, f"one of {', '.join(case.filaments)}", ("filament",))
     elif not isinstance(entry.at, str):
@@ -284,8 +289,6 @@ def _scalar(key: str, name: str, case: Scene) -> Iterator[Fault]:
     elif entry.kind in VECTORS and entry.along is None:
         found = f"{shown(name)}, three numbers ({entry.kind})"
         yield Fault(key, found, f"an observable of one number; give observe.{name}.along", reads)
-    elif entry.filament in case.filaments and case.filaments[entry.filament].copies is not None:
-        yield Fault(key, f"{shown(name)} of filament {entry.filament}, which has copies", "a filament without", reads)
 
 
 def _stops(case: Scene) -> Iterator[Fault]:

@@ -119,8 +119,8 @@ def _place(key: str, filament: Filament) -> Iterator[Fault]:
             yield Fault(f"{key}.copies", found, "{count, region} or {file}")
         elif copies.count is not None and copies.region is None:
             yield Fault(f"{key}.copies.region", "nothing", "two corners, with count")
-        elif copies.file is not None and copies.model_fields_set != {"file"}:
-            yield Fault(f"{key}.copies", "file and other keys", "file alone, or {count, region}")
+        elif copies.file is not None and not copies.model_fields_set <= {"file", "orientation"}:
+            yield Fault(f"{key}.copies", "file and other keys", "file alone or with orientation, or {count, region}")
     if copies is not None and isinstance(filament.shape, RunShape):
         yield Fault(f"{key}.copies", 'copies with shape.kind = "run"', "a filament for each, or another kind of shape")
     if copies is not None and copies.region is not None:

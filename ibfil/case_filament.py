@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field
@@ -226,8 +227,14 @@ class Copies(Table):
     region: Annotated[tuple[Vector, Vector], Listed(2)] | None = Field(
         None, description="two corners of the box they are placed in"
     )
-    orientation: Literal["random"] = Field("random", description="how they are turned")
-    file: str | None = Field(None, description="csv of the places, instead of count and region")
+    orientation: Literal["random", "same"] = Field(
+        "random", description="how they are turned: each by a random rotation, or not at all"
+    )
+    file: str | None = Field(
+        None,
+        description="csv of the places, instead of count and region: a row x, y, z a copy, or x, y, z and a quaternion "
+        "qx, qy, qz, qw that turns it",
+    )
 
 
 class Filament(Table):
@@ -261,8 +268,26 @@ class Filament(Table):
         description="what points along direction; auto: axis for helix and relaxed, else tangent (e3(0))",
     )
     normal: Vector = Field((0.0, 0.0, 1.0), description="e1 at s = 0, made normal to e3")
-    copies: Copies | None = Field(None, description="many of them")
+    copies: Copies | None = Field(None, description="many of them, called NAME_000, NAME_001 ...")
     shape: AnyShape = Field(Straight(), description="shape at t = 0")
     start: End = Field(End(), description="the end at s = 0")
     finish: End = Field(End(), description="the end at s = L")
     loads: Loads | None = Field(None, description="loads per length")
+
+
+def copy_name(name: str, number: int) -> str:
+    """What copy ``number``, from 0 on, of a filament is called: NAME_003."""
+    return f"{name}_{number:03d}"
+
+
+def single(filaments: Mapping[str, Filament], name: str) -> Filament | None:
+    """The one filament that ``name`` means: one without copies, or a copy by its own name, NAME_003; else None."""
+    whole = filaments.get(name)
+    if whole is not None and whole.copies is None:
+        return whole
+    stem, _, digits = name.rpartition("_")
+    many = filaments.get(stem)
+    if many is None or many.copies is None or not (digits.isascii() and digits.isdigit()):
+        return None
+    number, count = int(digits), many.copies.count
+    return many if copy_name(stem, number) == name and (count is None or number < count) else None

@@ -13,6 +13,7 @@ from .expressions import suggestion
 MAX_DEPTH = 16  # of tables and lists in each other
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""  # of a dotted key
 _LONG_KEY = re.compile(rf"(?:{_PART}\s*\.\s*){{{MAX_DEPTH}}}")
+NAMED = ("filament", "observe", "expect")  # tables whose names are the user's
 FORM = "KEY=VALUE, KEY a dotted path such as fluid.viscosity or stop.0.below"
 
 
@@ -65,6 +66,8 @@ def apply(raw: dict[str, Any], path: list[str], value: Any) -> dict[str, Any] | 
         if here[0] == "parameters" and depth == 1 and part not in table:
             return Fault(dotted(here), f"no such parameter{suggestion(part, table)}", ", ".join(table) or "none here")
         last = depth == len(path) - 1
+        if here[0] in NAMED and depth == 1 and not last and part not in table and suggestion(part, table):
+            return Fault(dotted(here), f"no such {here[0]}{suggestion(part, table)}", ", ".join(table))
         index = int(part) if isinstance(table, list) else part
         if last:
             table[index] = value

@@ -192,7 +192,8 @@ def _syntax(text: str) -> ast.expr:
     # Python reads other alphabets' letters as Latin ones; nobody should have to guess which.
     odd = re.search(r"[^A-Za-z0-9_+\-*/().,<>= \t\r\n]", text)
     if odd:
-        raise ExpressionError(f"the character {odd.group()!r} does not belong in an expression")
+        power = "; a power is written **" if odd.group() == "^" else ""
+        raise ExpressionError(f"the character {odd.group()!r} does not belong in an expression{power}")
     if not text.strip():
         raise ExpressionError("empty")
     try:

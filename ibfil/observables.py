@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from .case_filament import single
+from .errors import CaseError
 from .frames import FilamentFrame, Frame
 from .observables_place import Place
 from .observe import Kind, Unfit, Value
@@ -28,12 +30,17 @@ class OfFilament(Kind):
 
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)
-        self.length = case.filaments[self.filament].length
-        self.s = node_arclength(case.filaments[self.filament])
+        filament = single(case.filaments, self.filament)
+        assert filament is not None  # case_checks.py
+        self.model = filament
+        self.length, self.s = filament.length, node_arclength(filament)
         self.share = trapezoid_weights(self.s) / self.length  # (N,) of each node in the filament
 
     def look(self, frame: Frame) -> FilamentFrame:
-        """Return this filament at one output."""
+        """Return this filament at one output. Raises CaseError for a copy beyond those that a file has placed."""
+        if self.filament not in frame.filaments:
+            names = list(frame.filaments)
+            raise CaseError([f'an observable: filament: found "{self.filament}"; allowed: {names[0]} to {names[-1]}'])
         return frame.filaments[self.filament]
 
 
@@ -251,7 +258,7 @@ class Windowed(OfFilament):
             self.at = at
         elif self.supports and at in ("start", "finish"):
             self.end = str(at)
-            if getattr(case.filaments[self.filament], self.end).end == "free":
+            if getattr(self.model, self.end).end == "free":
                 raise Unfit("at", at, "an end that is held; a free end has no support")
         else:
             words = '"start" or "finish" for the support there, ' if self.supports else ""

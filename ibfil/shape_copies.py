@@ -10,9 +10,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .errors import CaseError
+from .points import read_csv
 
 if TYPE_CHECKING:
     from .case_filament import Copies
+
+_NAMES = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 Place = tuple[int, np.ndarray, np.ndarray]  # number, turn (3, 3), where ``position`` goes (3,)
 
@@ -20,34 +23,41 @@ Place = tuple[int, np.ndarray, np.ndarray]  # number, turn (3, 3), where ``posit
 def places(copies: Copies, position: tuple[float, float, float], key: str, folder: Path) -> Iterator[Place]:
     """The places of the copies: a turn about the filament's ``position``, and where that point goes.
 
-    At random: uniform in ``region``, turned by uniformly random rotations; the same seed gives the same places. From a
-    csv file: a row x, y, z a copy, turned at random, or x, y, z and a quaternion x, y, z, w. Raises CaseError.
+    At random: uniform in ``region``; the same seed gives the same places. From a csv file: a row x, y, z a copy, or
+    x, y, z and a quaternion x, y, z, w; a first row of names is passed over. Turned by the quaternion, else as
+    ``orientation`` says: by uniformly random rotations or not at all. Raises CaseError.
     """
     rng = np.random.default_rng(copies.seed)
     if copies.file is None:
         assert copies.count is not None
         assert copies.region is not None
         low, high = np.array(copies.region)
-        points = rng.uniform(low, high, (copies.count, 3))
-        turns = Rotation.random(copies.count, rng=rng)
+        rows = rng.uniform(low, high, (copies.count, 3))
     else:
         rows = _rows(folder / copies.file, key)
-        points = rows[:, :3]
-        turns = Rotation.random(len(rows), rng=rng) if rows.shape[1] == 3 else Rotation.from_quat(rows[:, 3:])
+    points = rows[:, :3]
+    if rows.shape[1] == 7:
+        turns = Rotation.from_quat(rows[:, 3:])
+    elif copies.orientation == "same":
+        turns = Rotation.identity(len(rows))
+    else:
+        turns = Rotation.random(len(rows), rng=rng)
     for k, (turn, point) in enumerate(zip(turns.as_matrix(), points, strict=True)):
         yield k, turn, point
 
 
 def _rows(path: Path, key: str) -> np.ndarray:
     """The rows (k, 3) or (k, 7) of a csv file."""
+    where = f"{key}.copies.file: {path.name}"
     try:
-        rows = np.loadtxt(path, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise CaseError([f"{key}.copies.file: {path.name} cannot be read as rows of numbers ({error})"]) from None
+        rows = read_csv(path, _NAMES)
+    except OSError as error:
+        raise CaseError([f"{where} cannot be read ({error.strerror})"]) from None
+    except ValueError as error:
+        raise CaseError([f"{where} {error}"]) from None
     if rows.shape[1] not in (3, 7) or not np.all(np.isfinite(rows)):
-        raise CaseError(
-            [f"{key}.copies.file: {path.name} has {rows.shape[1]} columns; allowed: x, y, z[, and a quaternion]"]
-        )
+        found = f"{rows.shape[1]} columns" if rows.shape[1] not in (3, 7) else "numbers that are not finite"
+        raise CaseError([f"{where} has {found}; allowed: x, y, z, or x, y, z and a quaternion qx, qy, qz, qw"])
     if rows.shape[1] == 7 and np.any(np.linalg.norm(rows[:, 3:], axis=1) < 1e-12):
-        raise CaseError([f"{key}.copies.file: {path.name} has a quaternion of zero length"])
+        raise CaseError([f"{where} has a quaternion of zero length"])
     return rows

@@ -12,7 +12,7 @@ from .shape_curves import Curve, carried_frame, perpendicular, unit
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-_NAMES = ["x", "y", "z", "e1x", "e1y", "e1z"]
+_NAMES = ("x", "y", "z", "e1x", "e1y", "e1z")
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
@@ -25,7 +25,7 @@ def read_points(path: Path) -> np.ndarray:
     if path.suffix.lower() not in (".csv", ".npy"):
         raise ValueError("must end in .csv or .npy")
     try:
-        table = _read_npy(path) if path.suffix.lower() == ".npy" else _read_csv(path)
+        table = _read_npy(path) if path.suffix.lower() == ".npy" else read_csv(path, _NAMES)
     except OSError as error:
         raise ValueError(f"cannot be read ({error.strerror})") from None
     if table.ndim != 2 or table.shape[1] not in (3, 6):
@@ -46,8 +46,11 @@ def _read_npy(path: Path) -> np.ndarray:
     return table
 
 
-def _read_csv(path: Path) -> np.ndarray:
-    """Numbers of a csv file; ValueError where a row is not numbers or not as long as the first."""
+def read_csv(path: Path, names: tuple[str, ...]) -> np.ndarray:
+    """The rows of numbers of a csv file, under a heading or none: all of ``names``, or the first three.
+
+    Raises OSError, and ValueError where a row is not numbers or not as long as the first.
+    """
     rows: list[list[float]] = []
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -57,7 +60,7 @@ def _read_csv(path: Path) -> np.ndarray:
         cells = [cell.strip() for cell in line.split(",")]
         if not line.strip() or line.lstrip().startswith("#"):
             continue
-        if not rows and [cell.lower() for cell in cells] in (_NAMES[:3], _NAMES):
+        if not rows and tuple(cell.lower() for cell in cells) in (names[:3], names):
             continue
         try:
             rows.append([float(cell) for cell in cells])

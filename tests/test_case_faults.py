@@ -112,3 +112,13 @@ def test_there_must_be_a_filament(value):
 def test_an_empty_file():
     lines = fault_lines({})
     assert [line.split(":")[1].strip() for line in lines] == ["filament", "fluid", "time", "output"]
+
+
+def test_a_misspelt_name_on_the_command_line_is_no_new_filament():
+    (line,) = fault_lines(SCENE, "filament.rood.nodes=21")
+    assert line.endswith('filament.rood: found no such filament; did you mean "rod"?; allowed: rod')
+
+
+def test_a_power_is_not_a_caret():
+    (line,) = fault_lines(SCENE, 'filament.rod.curvature=["s^2", 0]')
+    assert "the character '^' does not belong in an expression; a power is written **" in line

@@ -150,7 +150,7 @@ COMBINATIONS = [
     ([*EXPECT, "expect.e.value=1", "expect.e.tolerance=1", "expect.e.absolute=1"], "expect.e.tolerance", "one of"),
     ([*EXPECT, "expect.e.value=0"], "expect.e.tolerance", "absolute"),
     ([*EXPECT, "expect.e.value=1", "observe.v.kind=position"], "expect.e.observe", "three numbers"),
-    ([*EXPECT, "expect.e.value=1", f"{ROD}.copies.file=a"], "expect.e.observe", "copies"),
+    ([*EXPECT, "expect.e.value=1", f"{ROD}.copies.file=a"], "observe.v.filament", "copies"),
 ]
 
 
