@@ -42,6 +42,13 @@ class Run(RunFile):
 
     _flow: Flow | None = None
 
+    def __repr__(self) -> str:
+        filaments = ", ".join(
+            f"{name} ({columns['position'].shape[1]} nodes)" for name, columns in self.filaments.items()
+        )
+        span = f"t = {self.time[0]:g} to {self.time[-1]:g}"
+        return f"<Run {self.path}: {self.status}, {len(self)} outputs, {span}; {filaments}>"
+
     def output_at(self, time: float | None = None) -> int:
         """The number of the output nearest to ``time``; the last by default. Raises CaseError outside of the run."""
         if time is None:

@@ -193,7 +193,7 @@ class Observe(Table):
         "power",
         "dissipation",
         "efficiency",
-    ] = Field(description="what is taken", examples=["speed"])
+    ] = Field(description="what is taken; each is explained at the end of `ibfil schema`", examples=["speed"])
     filament: str = Field("", description="name of a filament; needed where there are several")
     at: Annotated[
         float | tuple[float, float] | Literal["start", "finish", "middle", "centroid"],

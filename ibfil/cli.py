@@ -37,14 +37,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except BrokenPipeError:
-        # The reader (`| head`) has gone: what Python still holds for it must not raise again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _let_go()
         return FAILED
     except CaseError as error:
         return _say(error.faults, BAD_INPUT)
     except RunFailed as error:
         return _say(str(error).splitlines(), FAILED)
     except (Interrupted, KeyboardInterrupt) as error:
+        try:
+            sys.stdout.flush()
+        except BrokenPipeError:
+            _let_go()
         return _say(str(error).splitlines() or ["interrupted"], CUT)
     except OSError as error:
         faults = [] if error.errno is not None else _damages(arguments)  # HDF5 gives no number
@@ -67,6 +70,11 @@ def _damages(arguments: argparse.Namespace) -> list[str]:
     from .examine import examine
 
     return examine(Path(path))
+
+
+def _let_go() -> None:
+    """The reader (`| head`) has gone: what Python still holds for it must not raise again at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say(faults: Sequence[str], status: int) -> int:
@@ -221,7 +229,8 @@ def _run(arguments: argparse.Namespace) -> int:
     _say_if_cold()
     from .running import run
 
-    return _end(run(case, output, overwrite=arguments.force, log=_log))
+    changes = " ".join(word for word in words[1:] if not word.startswith(("output.", "compute.")))
+    return _end(run(case, output, overwrite=arguments.force, log=_log), changes)
 
 
 def _resume(arguments: argparse.Namespace) -> int:
@@ -251,8 +260,8 @@ def _threads_of(run: str) -> int:
     return int(answer.stdout) if answer.returncode == 0 else 1
 
 
-def _end(result: Result) -> int:
-    """What a run ends with: the file, how it ended, the observables, and what was expected of them."""
+def _end(result: Result, changes: str = "") -> int:
+    """What a run ends with: the file, how it ended, the observables, and what was expected before ``changes``."""
     from .record import RunFile
     from .show import digest, duration, results
 
@@ -262,7 +271,7 @@ def _end(result: Result) -> int:
     reason = f" ({told['reason']})" if told["reason"] else ""
     print(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
     print(f"{result.path}: {told['outputs']} outputs")
-    print(results(told))
+    print(results(told, changes))
     return DONE
 
 
@@ -301,7 +310,13 @@ def _schema(arguments: argparse.Namespace) -> int:
 
     from .case_listing import schema_json, schema_text
 
-    print(json.dumps(schema_json(), indent=2) if arguments.json else schema_text())
+    if arguments.json:
+        print(json.dumps(schema_json(), indent=2))
+        return DONE
+    from .observe import kinds_text
+
+    print(schema_text())
+    print(kinds_text())
     return DONE
 
 

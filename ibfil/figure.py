@@ -17,6 +17,7 @@ import numpy as np
 from . import wrapping
 from .energy import elastic_energy
 from .errors import CaseError
+from .observe import KINDS
 from .time_series import trapezoid_weights
 from .units import label
 
@@ -252,7 +253,9 @@ def _meaning(run: RunFile, name: str) -> str:
     words = run.description(f"observables/{name}").split(",")[0]
     for filament in run.filaments:
         words = words.removesuffix(f" of {filament}")
-    return textwrap.shorten(f"{name}: {words}", 60, placeholder=" ...")
+    observe = run.case.observe.get(name)
+    fit = f" ({observe.kind})" if observe is not None and KINDS[observe.kind].number else ""
+    return textwrap.shorten(f"{name}{fit}: {words}", 60, placeholder=" ...")
 
 
 def _against_time(axes: Axes, run: RunFile, title: str, units: str, lines: dict[str, np.ndarray]) -> None:

@@ -252,7 +252,7 @@ class Loop:
             with self._signals, threadpool_limits(limits=1, user_api="blas"):
                 try:
                     status, reason = work()
-                except Interrupted:
+                except (Interrupted, BrokenPipeError):  # the pipe it speaks into: `ibfil run CASE | head`
                     raise self._interrupted() from None
                 return self._finished(status, reason)
         except Interrupted:

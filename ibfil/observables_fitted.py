@@ -31,7 +31,8 @@ class Drift(Component, kind="drift"):
     mean_only = True
     dimension = "length"
     summary_dimension = "length/time"
-    description = "position, of which the drift is taken,"
+    description = "position"
+    number = "drift (displacement over time)"
 
     def sample(self, frame: Frame) -> Value:
         """At one output."""
@@ -47,12 +48,16 @@ class Drift(Component, kind="drift"):
 
 
 class Growth(Amplitude, kind="growth"):
-    """Rate of exponential growth of the amplitude (`time_series.growth`). The series is the amplitude."""
+    """Rate of exponential growth of the amplitude: least squares on its logarithm, or on that of its peaks.
+
+    The series is the amplitude. As `time_series.growth`.
+    """
 
     keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", "over")
     fitted = True
     summary_dimension = "1/time"
-    description = "distance from the line through the start, of which the growth is fitted,"
+    description = "distance from the line through the start"
+    number = "growth rate of the distance from the line through the start"
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the rate over `over`."""
@@ -87,7 +92,8 @@ class Circularity(AcrossAxis, kind="circularity"):
     """Smaller over larger variance of the motion across `along`: 0 in a plane, 1 on a circle."""
 
     summary_dimension = "1"
-    description = "position, of which the circularity is taken,"
+    description = "position"
+    number = "circularity of the path"
 
     def sample(self, frame: Frame) -> Value:
         """At one output."""
@@ -99,14 +105,15 @@ class Circularity(AcrossAxis, kind="circularity"):
 
 
 class Frequency(AcrossAxis, kind="frequency"):
-    """Angular frequency, radians per time (`time_series.angular_rate`).
+    """Angular frequency of rotation about `along` (default x), or of oscillation across it, radians per time.
 
-    Of rotation about the line through the node at s = 0 along `along`, right-handed, or of oscillation across
-    it. The series is the position seen from that node (from the centroid where `at` is the start).
+    About the line through the node at s = 0, right-handed (`time_series.angular_rate`). The series is the position seen from
+    that node (from the centroid where `at` is the start).
     """
 
     summary_dimension = "rad/time"
-    description = "position seen from the start, of which the frequency is fitted,"
+    description = "position seen from the start"
+    number = "angular frequency of the position seen from the start"
 
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)
@@ -134,6 +141,7 @@ class DiffusionRatio(AtPlace, kind="diffusion_ratio"):
     mean_only = True
     default_at = "centroid"
     description = "diffusion across over along the gyration axis, so far,"
+    number = "diffusion across over along the gyration axis"
 
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)
@@ -178,6 +186,7 @@ class Efficiency(OfFilament, kind="efficiency"):
 
     keys = ("along", "over")
     description = "swimming efficiency, so far,"
+    number = "swimming efficiency"
 
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)

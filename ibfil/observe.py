@@ -7,6 +7,7 @@ the attributes of `Observable` may be added to a run.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
@@ -159,7 +160,7 @@ class Kind:
     """What the kinds of case files share: the keys `along`, `over` and `summary`. A kind adds ``sample``.
 
     ``keys`` are those that mean something to it; any other is refused. ``over`` is the window or None,
-    ``axis`` the direction `along` (3,) or None.
+    ``axis`` the direction `along` (3,) or None, ``words`` says what the summary is.
     """
 
     keys: ClassVar[tuple[str, ...]] = ()
@@ -167,7 +168,8 @@ class Kind:
     fitted: ClassVar[bool] = False  # the summary is a fit to the series
     dimension = "1"
     summary_dimension = "1"
-    description = ""
+    description = ""  # of the series
+    number: ClassVar[str] = ""  # what the summary is, where it is a fit
 
     def __init_subclass__(cls, kind: str = "") -> None:
         """Enter the class as the kind of that name. Only a fit's dimension is not its series' own."""
@@ -188,6 +190,10 @@ class Kind:
         self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
         details = [f"{key} = {_shown(getattr(observe, key))}" for key in ("at", "along", "space") if key in given]
         self.description = ", ".join([f"{self.description} of {observe.filament}", *details])
+        how = "" if self.fitted or observe.summary == "last" else f"{observe.summary} over time of "
+        over = [] if observe.over is None else [f"over = {_shown(observe.over)}"]
+        what = f"{self.number or how + type(self).description} of {observe.filament}"
+        self.words = ", ".join([what, *details, *over])
 
     def sample(self, frame: Frame) -> Value:
         """Value at one output."""
@@ -219,6 +225,18 @@ class Kind:
 
 
 KINDS: dict[str, type[Kind]] = {}
+
+
+def kinds_text() -> str:
+    """What each kind of observable is and which keys it has, for `ibfil schema`."""
+    from . import observables, observables_fitted  # noqa: F401  (they fill KINDS)
+
+    lines = ["The kinds of [observe.NAME]: what each takes at an output, or of the run, and the keys it has"]
+    for name, kind in KINDS.items():
+        meaning = " ".join((kind.__doc__ or "").split("\n\n")[0].split()).rstrip(".")
+        line = f"{name}: {meaning} ({', '.join(kind.keys)})"
+        lines.append(textwrap.fill(line, 112, initial_indent="  ", subsequent_indent="      "))
+    return "\n".join(lines)
 
 
 def plain(value: np.ndarray) -> Value:

@@ -64,6 +64,9 @@ class Column:
     def __len__(self) -> int:
         return self.shape[0]
 
+    def __repr__(self) -> str:
+        return f"<Column {self.shape} {self.dtype}; [...] reads>"
+
     def __getitem__(self, key: Any) -> np.ndarray:
         first, *rest = key if isinstance(key, tuple) else (key,)
         if isinstance(first, slice):

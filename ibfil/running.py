@@ -137,6 +137,8 @@ def _last_checkpoint(path: Path) -> checkpoint.Checkpoint:
         if path.exists():
             with RunFile(path) as run_file:
                 status = f"; its run is {run_file.status}"
+                if run_file.status in ("finished", "stopped"):
+                    status += ', and a new one may start from its last frame: shape = { kind = "run", path = ... }'
         raise RunFileError(f"{path}: no checkpoint {beside.name} to go on from{status}")
     return checkpoint.read(beside)
 

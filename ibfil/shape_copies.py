@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .errors import CaseError
-from .points import read_csv
+from .shape_points import read_csv
 
 if TYPE_CHECKING:
     from .case_filament import Copies

@@ -69,7 +69,7 @@ def _observed(run: RunFile, name: str, observable: Observable | None, found: Sum
     return {
         "value": _plain(found.value),
         "units": units,
-        "description": run.description(path),
+        "description": getattr(observable, "words", run.description(path)),
         "note": found.note,
     }
 
@@ -122,28 +122,32 @@ def as_text(told: Mapping[str, Any]) -> str:
     )
 
 
-def results(told: Mapping[str, Any]) -> str:
-    """The observables and what was expected of them, as `ibfil run` ends with."""
+def results(told: Mapping[str, Any], changes: str = "") -> str:
+    """The observables and what was expected of them, of the case without ``changes``, as `ibfil run` ends with."""
     rows = [
         (name, "=", _number(found["value"]), found["units"], found["note"] or found["description"])
         for name, found in told["observables"].items()
     ]
     lines = ["observables", *_unit_rows(rows)] if rows else ["no observables in this case"]
     if told["expected"]:
-        lines += ["", "expected", *table(_held(one) for one in told["expected"])]
+        lines += [
+            "",
+            f"expected of the case without {changes}" if changes else "expected",
+            *table(_held(one) for one in told["expected"]),
+        ]
     return "\n".join(lines)
 
 
 def _held(one: Mapping[str, Any]) -> tuple[str, ...]:
     """The columns of one expectation."""
-    verdict = "ok" if one["passed"] else "FAIL"
+    verdict = "ok" if one["passed"] else "differs"
     source = f"({one['source']})" if one["source"] else ""
     return verdict, one["name"], _number(one["found"]), f"expected {one['expected']}", one["note"] or source
 
 
-def _unit_rows(rows: Iterable[tuple[str, ...]]) -> list[str]:
-    """A table in which the unit "1" is not written."""
-    return table(["" if cell == "1" else cell for cell in row] for row in rows)
+def _unit_rows(rows: Iterable[tuple[str, str, str, str, str]]) -> list[str]:
+    """A table of name, sign, number, unit, words, in which the unit "1" is not written."""
+    return table((name, sign, number, "" if unit == "1" else unit, words) for name, sign, number, unit, words in rows)
 
 
 def table(rows: Iterable[Iterable[str]]) -> list[str]:

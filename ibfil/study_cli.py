@@ -6,6 +6,7 @@ As in cli.py only the standard library is imported here.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from .threads import set_threads
 
 if TYPE_CHECKING:
     from .study import Axis
+    from .trade import Trade
 
 CASE = "the case, a file or a shipped name, and changes to it that hold for all runs"
 VARY = "what is varied: KEY=V1,V2,..., any number of times; keys that change together: KEY=V1,V2&OTHER=W1,W2"
@@ -170,12 +172,24 @@ def _trade(arguments: argparse.Namespace) -> int:
         return 0
     best = made.cheapest(arguments.wanted)
     if best is None:
-        raise RunFailed(
-            f"no setting comes within {arguments.wanted:g} in {', '.join(made.measures)}",
-            advice="vary other keys, or shorter steps; the reference's own error is part of what is asked",
-        )
-    print(" ".join(best.setting.overrides))
+        return _none_within(made, arguments.wanted)
+    print(f"the cheapest within {arguments.wanted:g}:")
+    print(*best.setting.overrides)
     return 0
+
+
+def _none_within(made: Trade, wanted: float) -> int:
+    """Say how near the settings came."""
+    told = f"ibfil: no setting comes within {wanted:g} in {', '.join(made.measures)}"
+    done = [one for one in made.tried if one.errors]
+    if done:
+        best = min(done, key=lambda one: max(made.error(one, measure) for measure in made.measures))
+        worst = max(made.measures, key=lambda measure: made.error(best, measure))
+        named = " ".join(best.setting.overrides)
+        told += f"; the nearest, {named}, is {made.error(best, worst):.2g} off in {worst}, with the reference's own"
+    print(told, file=sys.stderr)
+    print("ibfil: what to change: vary other keys, or shorter steps", file=sys.stderr)
+    return 1
 
 
 def _compare(arguments: argparse.Namespace) -> int:

@@ -64,12 +64,12 @@ class Trade:
 
     def cheapest(self, error: float) -> Tried | None:
         """Return the cheapest setting of which all errors, with the reference's own added, are at most ``error``."""
-        good = [
-            one
-            for one in self.tried
-            if one.errors and all(one.errors[m] + self.reference.estimate(m) <= error for m in self.measures)
-        ]
+        good = [one for one in self.tried if one.errors and all(self.error(one, m) <= error for m in self.measures)]
         return min(good, key=lambda one: one.cost, default=None)
+
+    def error(self, one: Tried, measure: str) -> float:
+        """What a setting's error may be: as found, and the reference's own."""
+        return one.errors[measure] + self.reference.estimate(measure)
 
     def uncertain(self, one: Tried, measure: str) -> bool:
         """Whether an error is under what the reference can tell."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -14,7 +15,8 @@ import pytest
 from made_run import BENT, make_run
 from runs import wait_for
 
-from ibfil import cli, shipped
+from ibfil import cli, observables, observables_fitted, shipped  # noqa: F401  (they fill KINDS)
+from ibfil.observe import KINDS
 from ibfil.record import RunFile
 
 ROOT = Path(__file__).parent.parent
@@ -94,6 +96,19 @@ def test_run_writes_the_run_file_and_tells_the_result(here, capsys):
         assert run.status == "finished"
         assert len(run) == 5
     assert {path.name for path in here.iterdir()} == {"bent.toml", "bent.h5"}
+
+
+def test_what_was_expected_of_the_case_before_it_was_changed(here, capsys):
+    assert cli.main(["run", "bent.toml", "filament.rod.shape.curvature=3", "output.checkpoint_every=9"]) == 0
+    out = capsys.readouterr().out
+    assert "expected of the case without filament.rod.shape.curvature=3\n" in out
+    assert [line.split()[:2] for line in out.splitlines() if " span " in line][-1] == ["differs", "span"]
+
+
+def test_a_finished_run_says_how_to_begin_where_it_ended(here, capsys):
+    assert cli.main(["run", "bent.toml"]) == 0
+    assert cli.main(["run", "--resume", "bent.h5", "time.end=9"]) == 2
+    assert 'a new one may start from its last frame: shape = { kind = "run"' in capsys.readouterr().err
 
 
 def test_words_may_stand_before_and_after_options(here, capsys):
@@ -241,6 +256,26 @@ def test_a_reader_that_stops_early_hears_nothing(here, words):
     assert process.wait() == 1
 
 
+def test_a_run_whose_reader_stops_is_cut_and_can_go_on(here):
+    command = [sys.executable, "-m", "ibfil", "run", "bent.toml", "time.end=20", "output.every=1"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    assert process.stdout is not None
+    while not process.stdout.readline().startswith("t = "):
+        assert process.poll() is None
+    process.stdout.close()  # as `| head -4` does, before the next tenth is told
+    assert process.stderr is not None
+    err = process.stderr.read()
+    assert process.wait() == 130
+    assert "Traceback" not in err
+    assert "interrupted at t = " in err
+    with RunFile("bent.h5") as run:
+        assert run.status == "interrupted"
+    assert cli.main(["run", "--resume", "bent.h5"]) == 0
+    with RunFile("bent.h5") as run:
+        assert run.status == "finished"
+
+
 @pytest.mark.parametrize(("cache", "said"), [("ibfil_1", False), ("other_1", True), (None, True)])
 def test_a_first_run_is_told_that_it_compiles(here, capsys, monkeypatch, cache, said):
     monkeypatch.setattr(cli, "__file__", str(here / "ibfil" / "cli.py"))
@@ -292,6 +327,9 @@ def test_schema_is_text_or_json_schema(capsys):
         assert key in schema["properties"]
     for name in schema["properties"]:
         assert name in text
+    assert set(KINDS) >= {"drift", "position"}
+    for kind in KINDS:  # says of each what it is and which keys it has
+        assert re.search(rf"\n  {kind}: [A-Z|][^\0]*?\((\w+,\s+)*\w+\)", text), kind
 
 
 def test_check_runs_nothing_and_tells(here, capsys):

@@ -61,9 +61,7 @@ def test_times_that_differ_by_rounding_are_in_the_window():
 def test_descriptions_and_units():
     _, looking = observing('kind = "frequency"\nat = "middle"\nalong = [0, 1, 0]')
     observable = looking.observables["o"]
-    assert observable.description == (
-        'position seen from the start, of which the frequency is fitted, of rod, at = "middle", along = [0, 1, 0]'
-    )
+    assert observable.description == ('position seen from the start of rod, at = "middle", along = [0, 1, 0]')
     units = parse_case(CASE, "case.toml").units
     assert label(units, observable.dimension) == "um"
     assert label(units, observable.summary_dimension) == "rad/s"

@@ -136,3 +136,9 @@ def test_a_dataset_for_xarray(made):
         assert data["long_force"].attrs["units"] == "pN"
         np.testing.assert_array_equal(data["short_position"].sel(time=0.75), run.filaments["short"]["position"][3])
         np.testing.assert_array_equal(data["tip"].sel(xyz="y"), run.observables["tip"][:, 1])
+
+
+def test_a_run_says_what_it_is_where_it_is_printed(made):
+    with ibfil.open(made) as run:
+        assert repr(run).startswith(f"<Run {made}: finished, 5 outputs, t = 0 to 1; long (9 nodes), short (7 nodes)")
+        assert repr(run.filaments["long"]["position"]).startswith("<Column (5, 9, 3) float64")

@@ -68,7 +68,22 @@ def test_text_tells_what_a_user_asks_first(run):
     lines = text.splitlines()
     assert any(line.split()[:3] == ["speed", "=", "3"] and "um/s" in line for line in lines)
     assert any(line.split()[:2] == ["ok", "right"] for line in lines)
-    assert any(line.split()[:2] == ["FAIL", "wrong"] for line in lines)
+    assert any(line.split()[:2] == ["differs", "wrong"] for line in lines)
+
+
+def test_the_number_1_is_shown_and_the_unit_1_is_not(run):
+    told = show.digest(run)
+    told["observables"]["speed"] |= {"value": 1.0, "units": "1"}
+    told["diagnostics"] = {"stretch": {"min": 1.0, "max": 1.0, "units": "1"}}
+    lines = show.as_text(told).splitlines()
+    assert any(line.split()[:4] == ["speed", "=", "1", "drift"] for line in lines)
+    assert any(line.split() == ["stretch", "1", "to", "1"] for line in lines)
+
+
+def test_the_summary_says_how_its_number_was_made(run):
+    told = show.digest(run)["observables"]
+    assert told["speed"]["description"].startswith("drift (displacement over time) of short, ")
+    assert told["tip"]["description"].startswith("position of short, at")
 
 
 def test_json_is_json_also_with_numbers_that_are_none(run):
@@ -112,7 +127,7 @@ def test_figure_shows_all_there_is(run):
         "Centroid",
         "Flow at z",
         "tip: position (um)",
-        "speed: position (um)",
+        "speed (drift): position (um)",
         "speed of the centroid (um/s)",
         "elastic energy (pN um)",
         "power on the fluid (pN um/s)",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import signal
 from dataclasses import replace
 
@@ -120,7 +121,10 @@ def test_a_trade_has_a_table_a_figure_and_ends_with_the_cheapest(here, capsys):
     assert [len(one["seconds"]) for one in told["settings"] if one["status"] == "finished"] == [2, 2]
     assert (here / "out/trade.png").read_bytes().startswith(b"\x89PNG")
     assert cli.main([*command, "--for", "1e-12"]) == 1  # nothing is so good
-    assert "no setting comes within 1e-12" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "no setting comes within 1e-12" in err
+    assert re.search(r"; the nearest, time.step=1e-3 time.scheme=implicit.*, is [\d.e-]+ off in ", err)
+    assert "the run stopped" not in err
 
 
 IMPLICIT = ["time.scheme=implicit", "time.order=1"]
