@@ -107,8 +107,8 @@ class Circularity(AcrossAxis, kind="circularity"):
 class Frequency(AcrossAxis, kind="frequency"):
     """Angular frequency of rotation about `along` (default x), or of oscillation across it, radians per time.
 
-    About the line through the node at s = 0, right-handed (`time_series.angular_rate`). The series is the position seen from
-    that node (from the centroid where `at` is the start).
+    About the line through the node at s = 0, right-handed (`time_series.angular_rate`). The series is the position seen
+    from that node (from the centroid where `at` is the start).
     """
 
     summary_dimension = "rad/time"
