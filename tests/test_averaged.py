@@ -29,7 +29,8 @@ STATED = {"peskin4": (3.6e-3, 1.0e-2), "roma3": (1.1e-2, 2.7e-2), "bkp6": (2.8e-
 def test_the_averaged_table_is_off_by_what_is_stated(name):
     """The swimmer of ib_numerics.md, section 1: 41 nodes, 64^3; over the matrix, and the largest over a node's own.
 
-    Where it lies in its cell changes the first by a quarter (peskin4 3.0e-3 to 4.6e-3), so the mean over eight places.
+    Where it lies in its cell changes the first by a quarter (peskin4 3.0e-3 to 4.6e-3), so the mean over eight places,
+    which is known to three times a quarter over sqrt(12 * 8), and a digit of what is stated.
     """
     kernel, grid, none = KERNELS[name], Grid([3.2] * 3, [64] * 3), np.zeros(41)
     response = mobility.point_response(grid, 1.0)

@@ -60,23 +60,21 @@ def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(made):
     assert comparison.window.count == 1
     assert comparison.window.period == pytest.approx(2 * np.pi / 10, rel=1e-4)
     assert by["stokes"]["both sides differ by, at most"].value < 1e-10
-    assert 0 < by["stokes"]["slip's share of the power"].value < 0.2
+    assert 0 < by["stokes"]["slip's share of the power"].value < 0.2  # far from all; the number: test_dissipation.py
     assert by["rft"]["dissipated by the fluid"].value == pytest.approx(by["rft"]["power of the nodes"].value)
+    turning = [numbers["frequency (angular)"].value for numbers in by.values() if "frequency (angular)" in numbers]
+    assert turning
+    assert turning == pytest.approx([10.0] * len(turning), rel=1e-2)  # the wave's; the fit's window is one period
     for fluid in by:
-        assert (
-            by[fluid]["frequency (angular)"].value == pytest.approx(10.0, rel=0.03)
-            if "frequency (angular)" in by[fluid]
-            else True
-        )
         assert by[fluid]["speed"].value > 0
         assert by[fluid]["wall time a unit of time"].value > 0
     assert "distance from the first, rms/L" not in by["rft"]
     assert (
         by["stokes"]["distance from the first, rms/L"].value > by["stokes"]["the same without rigid motion"].value > 0
     )
-    # Little inertia: near Stokes, far from resistive-force theory.
+    # Little inertia: nearer to Stokes than resistive-force theory is.
     near = abs(by["navier-stokes"]["speed"].value - by["stokes"]["speed"].value)
-    assert near < 0.3 * abs(by["rft"]["speed"].value - by["stokes"]["speed"].value)
+    assert near < abs(by["rft"]["speed"].value - by["stokes"]["speed"].value)
     with open(folder / "compare.csv", newline="") as file:
         rows = {row["quantity"]: row for row in csv.DictReader(file)}
     assert float(rows["speed"]["matched"]) == by["matched"]["speed"].value

@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -21,13 +22,14 @@ from ibfil.schedule import due_times
 
 
 def test_outputs_are_at_their_exact_times(path):
+    began = time.monotonic()
     result = run(case(), path)
     assert np.array_equal(result.times, [0.05 * k for k in range(20)] + [1.0])
     assert (result.status, result.reason, result.path, result.steps) == ("finished", "", path, 340)
     with RunFile(path) as file:
         assert np.array_equal(file.time, result.times)
         assert (file.status, file.steps, file.method, file.wisdom) == ("finished", 340, "fake", "(fake wisdom)")
-        assert 0 < file.wall_time < 60
+        assert 0 < file.wall_time < time.monotonic() - began
         assert file.finished > file.created
     assert [entry.name for entry in path.parent.iterdir()] == ["run.h5"]  # no checkpoint, no journal
 

@@ -66,24 +66,25 @@ def test_without_slip_nodes_half_a_cell_apart_lock_and_with_it_they_do_not(tmp_p
     kinds = {(one.setting.values["fluid.slip"], one.setting.values["fluid.cells"]): one for one in made.cells}
     locked = kinds["0", "[16,16,16]"]
     assert (locked.kind, locked.predicted) == ("locked", "locked")
-    assert locked.numbers["force"] > 15
     for key in (("0", "[32,32,32]"), ("0.01", "[16,16,16]"), ("0.01", "[32,32,32]")):
         assert (kinds[key].kind, kinds[key].predicted) == ("stable", ""), key
     assert made.foretold == 4
 
 
 def test_too_long_a_step_is_wrong_and_that_is_predicted(tmp_path):
-    made = stability.stability(
-        WAVE, [axis("time.step=0.1,0.02")], tmp_path, ["fluid.model=rft", "time.end=0.6"], say=quiet
-    )
-    long, short = made.cells
-    assert long.predicted == "wrong"
-    assert (short.kind, short.predicted) == ("stable", "")
-    assert long.numbers["place"] > 3 * short.numbers["place"]
+    """Steps of 2 and of 0.2 radians of the wave, taken whole, as outputs are further apart."""
+    two = ["fluid.model=rft", "time.end=1.2", "output.every=0.6"]
+    made = stability.stability(WAVE, [axis("time.step=0.2,0.02")], tmp_path, two, say=quiet)
+    assert [(one.kind, one.predicted) for one in made.cells] == [("wrong", "wrong"), ("stable", "")]
+    assert made.foretold == 2
 
 
 def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):
-    """2/rho(M K), which another number of nodes has elsewhere: 0.8 of it is stable, 1.3 of it diverges."""
+    """2/rho(M K), which another number of nodes has elsewhere: 0.8 of it is stable, 1.3 of it diverges.
+
+    At f of the limit the stiffest motion grows by 2 f - 1 a step: at 1.3, in the 37 steps (0.02/1.3 limits of 9 nodes;
+    196 of 13) by 4e7 at least, from what a bent rod with free ends has of it to begin with; below 1 it decays.
+    """
     explicit = ["time.scheme=explicit", "time.order=1", "time.end=0.02"]
     vary = ["--vary", "filament.rod.nodes=9,13", "--vary", "time.step=LIMIT", "-o", "out"]
     from ibfil.case import read_case
