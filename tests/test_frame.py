@@ -97,6 +97,21 @@ def test_a_tangent_that_reverses_within_a_step_is_refused_with_its_node() -> Non
     assert caught.value.node == 8
 
 
+def test_a_rod_may_turn_by_up_to_168_degrees_within_a_step() -> None:
+    """1 + cos of it is 0.022, of 169 degrees 0.018; at 0.02 rounding is magnified a hundredfold (Eq. 41)."""
+    rod = {"length": 1.0, "nodes": 9, "derivative": 2, "bending": 1.0, "stretching": 100.0}
+    rods = Simulation(scene({"rod": rod}))
+    straight = rods.shape.r
+
+    def turned(degrees: float) -> np.ndarray:
+        return Rotation.from_euler("z", degrees, degrees=True).apply(straight)
+
+    there = rods.mechanics.move(rods.shape, turned(168) - straight)
+    assert there.e3 == pytest.approx(np.tile(turned(168)[-1] / 0.5, (9, 1)), abs=1e-13)
+    with pytest.raises(TangentReversed, match=r"0\.018 \(allowed 0\.02\)"):
+        rods.mechanics.move(rods.shape, turned(169) - straight)
+
+
 # A clamp that turns. C and the drag are such that nothing but the clamp matters: e1 there is prescribed.
 
 

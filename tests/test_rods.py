@@ -105,6 +105,16 @@ def test_at_a_clamp_r1_is_the_tangent_and_r2_exact_for_cubics(s: np.ndarray, der
 
 
 @SPACINGS
+@pytest.mark.parametrize("end", [0, -1])
+def test_by_a_ghost_node_r2_at_a_clamp_takes_two_nodes_and_is_exact_for_parabolas(s: np.ndarray, end: int) -> None:
+    curve = polynomials(2)
+    held = np.array([p.deriv()(s[end]) for p in curve])
+    mesh = stack([Segmented(s, 2, held if end == 0 else None, held if end == -1 else None, ghost=True)])
+    assert_derivative(mesh, s, curve, 2, slice(0, 1) if end == 0 else slice(-1, None))
+    assert np.count_nonzero(mesh.w2[end]) == 2
+
+
+@SPACINGS
 def test_control_volumes_are_half_the_segments_beside_a_node(s: np.ndarray) -> None:
     mesh = stack([Segmented(s, 6, None, None)])
     edges = np.concatenate([[s[0]], 0.5 * (s[1:] + s[:-1]), [s[-1]]])
