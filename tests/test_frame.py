@@ -98,7 +98,7 @@ def test_a_tangent_that_reverses_within_a_step_is_refused_with_its_node() -> Non
 
 
 def test_a_rod_may_turn_by_up_to_168_degrees_within_a_step() -> None:
-    """1 + cos of it is 0.022, of 169 degrees 0.018; at 0.02 rounding is magnified a hundredfold (Eq. 41)."""
+    """1 + cos of it is 0.022, of 169 degrees 0.018; at 0.02 Eq. 41 magnifies rounding by sqrt(2/0.02) = 10."""
     rod = {"length": 1.0, "nodes": 9, "derivative": 2, "bending": 1.0, "stretching": 100.0}
     rods = Simulation(scene({"rod": rod}))
     straight = rods.shape.r
