@@ -8,10 +8,13 @@ the rate of the wave of preferred curvature, or of the clamp's spin.
 
     .  survives, every step solved at once
     h  survives, some steps were halved on the way (Newton's iteration failed)
-    c  both runs stop where a segment has collapsed to a fifth of its length (Simulation's own limit)
+    c  both runs stop where a segment has collapsed to a fifth of its length or grown to twice it (Simulation's own
+       limits): no solution to follow. EA 50, Re 100, eta 100: at t = 0.63 with 20 nodes and 0.54 with 41, whether
+       with 100 steps a period or 400, and 0.52 with 81; at 0.65 and 0.56 with 25
     s  differs from the finer run, which is soft: P = M1 O1 + M2 O2 comes above 0.3 EA. That number is read off this
        map, where nothing below it fails; many cells above it survive. A wave of curvature 8/L met half a period
-       late, as at large eta, has P = 128 A/L^2
+       late, as at large eta, has P = 128 A/L^2. EA 50, Re 10, eta 100: stretched by 80 %, 2.9 and 3.9 points off
+       with 25 steps a period, 1.0 and 1.1 with 50, 0.2 and 0.3 with 100
     t  refused, at finer steps too: the clamp winds the rod up to a quarter turn between nodes before the twist can
        spread; more nodes where that is meant
     !  fails otherwise
@@ -67,6 +70,7 @@ class Path:
     iterations: int  # the most in a step
     pull: float  # the largest (M1 O1 + M2 O2)/EA
     words: str  # why it failed
+    until: float = 0.0  # the time it came to
 
 
 @dataclass(frozen=True)
@@ -107,10 +111,15 @@ def _fluid(cell: Cell) -> dict[str, Any]:
     return grid | ({"density": cell.re * cell.eta / UMAX} if cell.re else {})
 
 
+def _first(cell: Cell) -> int:
+    """How many looks lie in the period that a fluid with inertia takes to come into motion."""
+    return LOOKS if cell.re else 0
+
+
 def case(cell: Cell, finer: int = 1) -> Case:
     """The cell's case, with a step so many times finer."""
-    step = cell.step / OMEGA / finer
-    return scene({"rod": _rod(cell)}, _fluid(cell), viscosity=cell.eta, end=PERIOD / OMEGA, step=step)
+    step, end = cell.step / OMEGA / finer, PERIOD / OMEGA * (2 if cell.re else 1)
+    return scene({"rod": _rod(cell)}, _fluid(cell), viscosity=cell.eta, end=end, step=step)
 
 
 def follow(cell: Cell, finer: int = 1) -> Path:
@@ -124,14 +133,15 @@ def follow(cell: Cell, finer: int = 1) -> Path:
         path.pull = max(path.pull, float(np.max(pull)))
         path.iterations = max(path.iterations, int(simulation.frame().diagnostics["newton_iterations"]))
 
+    count = LOOKS + _first(cell)
     try:
-        for k in range(1, LOOKS + 1):
-            simulation.advance(simulation.case.time.end * k / LOOKS, watch)
+        for k in range(1, count + 1):
+            simulation.advance(simulation.case.time.end * k / count, watch)
             path.looks.append((simulation.shape.r, simulation.shape.length[:-1] / rods.mesh.ds[:-1]))
     except RunFailed as failed:
         watch()
         path.words = str(failed)
-    path.halved = simulation.shortened
+    path.halved, path.until = simulation.shortened, simulation.time
     return path
 
 
@@ -140,7 +150,7 @@ def judge(cell: Cell) -> Verdict:
     path, finer = follow(cell), follow(cell, FINER)
     pairs = list(zip(path.looks, finer.looks, strict=False))
     place = max((rms(a[0] - b[0]) for a, b in pairs), default=np.nan)
-    stretch = max((float(np.max(np.abs(a[1] - b[1]))) for a, b in pairs), default=np.nan)
+    stretch = max((float(np.max(np.abs(a[1] - b[1]))) for a, b in pairs[_first(cell) :]), default=np.nan)
     if not path.words and not finer.words and place <= PLACE and stretch <= STRETCH:
         mark = "h" if path.halved else "."
     else:
@@ -243,13 +253,16 @@ def line(cell: Cell, verdict: Verdict) -> str:
     )
     a, b = verdict.path, verdict.finer
     numbers = f"{verdict.place:.1e},{verdict.stretch:.1e},{b.pull:.2g},{a.halved},{b.halved},{a.iterations}"
+    numbers += f",{a.until:.3g},{b.until:.3g}"
     return f"{verdict.mark},{','.join(f'{k:g}' if isinstance(k, float) else str(k) for k in keys)},{numbers},{a.words}"
 
 
 def main() -> None:
     """The map, then every cell, then how many of each mark."""
     found = list(tables(*sys.argv[1:2]))
-    print("\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re,position,stretch,pull,halved,finer,iterations,words")
+    print(
+        "\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re,position,stretch,pull,halved,finer,iterations,until,finer,words"
+    )
     for cell, verdict in found:
         print(line(cell, verdict))
     print("\n" + ", ".join(f"{mark} {count}" for mark, count in Counter(v.mark for _, v in found).most_common()))
