@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import stokes
-from .navier_stokes import Background, NavierStokes, Room
+from .assemble_loads import number, triple
+from .navier_stokes import Background, NavierStokes, Part, Room
+from .separation import products
 from .torque_coupling import StirredSolve
 
 if TYPE_CHECKING:
     from .case_schema import Case
     from .immersed import Immersed
+    from .separation import Product
 
 
 def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> NavierStokes:
@@ -39,6 +42,16 @@ def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> Navi
     assert case.fluid.density is not None
     background = None
     if made.flow is not None:
-        steady = not any("t" in component.variables for component in case.fluid.flow or ())
-        background = Background(made.grid, made.flow, steady, threads)
+        background = Background(made.grid, made.flow, flow_parts(case), threads)
     return NavierStokes(made, case.fluid.density, operator, room, background)
+
+
+def flow_parts(case: Case) -> list[Part] | None:
+    """What the case's background flow is the sum of: fixed fields times factors in time; None: it is no such sum."""
+    found = products(case.fluid.flow or ())
+    return None if found is None else [_part(one) for one in found]
+
+
+def _part(one: Product) -> Part:
+    place = triple(one.place, "x", "y", "z")
+    return Part(None if one.factor.constant else number(one.factor), lambda r: place(*r.T))

@@ -165,6 +165,11 @@ def parse(value: str | int | float, variables: Sequence[str] = (), parameters: P
     return Expression(value, tree, frozenset(leaf for leaf in leaves if isinstance(leaf, str)))
 
 
+def of_tree(tree: Tree) -> Expression:
+    """The expression of a tree made of others' parts."""
+    return Expression(_text(tree), tree, frozenset(leaf for leaf in _leaves(tree) if isinstance(leaf, str)))
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """'; did you mean "..."?' with the one of ``known`` nearest to ``name``, or nothing."""
     near = difflib.get_close_matches(name, sorted(known), n=1)

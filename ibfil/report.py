@@ -16,6 +16,7 @@ from .terms import shares, terms
 if TYPE_CHECKING:
     from .case import Case
     from .case_schema import Contact, Thermal
+    from .navier_stokes import Part
 
 
 def report(case: Case) -> str:
@@ -177,9 +178,24 @@ def memory(simulation: Simulation) -> dict[str, float]:
         out["past of the fluid, as large in a checkpoint"] = 4 * modes
         out["its transforms"] = modes + 4 * modes
         out["mobility table"] *= 2  # of Euler's first step, and of BDF2's
+        if case.fluid.flow is not None:
+            out["the background flow"] = _flow_fields(case) * 6 * 8.0 * float(np.prod(cells))
     elif simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
         out["fields and their transforms"] = (parts - 2) * 2 * 3 * 8.0 * float(np.prod(cells))
     return out
+
+
+def _flow_parts(case: Case) -> list[Part]:
+    """What a background flow is the sum of; nothing where it is no sum that is seen."""
+    from .assemble_inertia import flow_parts
+
+    return flow_parts(case) or []
+
+
+def _flow_fields(case: Case) -> int:
+    """How many fields a background flow of a fluid with inertia takes: its parts and their sum."""
+    parts = _flow_parts(case)
+    return len(parts) + (len(parts) != 1 or parts[0].factor is not None)
 
 
 def _disk(simulation: Simulation) -> float:
@@ -210,6 +226,11 @@ def _costs(simulation: Simulation) -> list[str]:
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
+    if case.fluid.model == "navier-stokes" and case.fluid.flow is not None and not _flow_parts(case):
+        lines.append(
+            "fluid.flow is no sum of at most 4 products f(t) g(x, y, z) that is seen: it is put on the grid each step, "
+            "which takes as long as the step itself or twice that"
+        )
     lines.append(f"disk at most {_bytes(_disk(simulation))}, fields compressed")
     steps = case.time.end / simulation.step_length
     seconds = steps * simulation.method_seconds[simulation.method]

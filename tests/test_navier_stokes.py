@@ -30,11 +30,11 @@ FAR = np.array([[0.3, -0.2, 0.1]])  # a node to ask at
 ZERO = np.zeros((1, 3))
 
 
-def fluid(cells=(16, 16, 16), density=1.0, viscosity=0.1, flow=None, steady=True) -> NavierStokes:
+def fluid(cells=(16, 16, 16), density=1.0, viscosity=0.1, flow=None, parts=None) -> NavierStokes:
     """In a box of 2 pi along x, of cubic cells, with one node that has no slip."""
     grid = Grid([2 * np.pi * n / cells[0] for n in cells], cells)
     made = Immersed(grid, KERNELS["peskin4"], viscosity, np.zeros(1), None, flow)
-    background = None if flow is None else Background(grid, flow, steady)
+    background = None if flow is None else Background(grid, flow, parts)
     return NavierStokes(made, density, lambda alpha: StokesByTable(made, alpha), Room(grid), background)
 
 
@@ -174,7 +174,7 @@ def test_advection_does_no_work_and_moves_no_mean():
 def test_a_background_flow_advects_and_is_advected(seed):
     """N(U + u) - N(U), each by the fluid that has no background."""
     flow = lambda r, t: np.stack([0.4 + np.sin(r[:, 1]), 0.2 + 0 * r[:, 0], np.cos(r[:, 0] - r[:, 1] + t)], axis=1)  # noqa: E731
-    it, plain = fluid(flow=flow, steady=False), fluid()
+    it, plain = fluid(flow=flow), fluid()
     x, y, _ = places(it)
     u, background = waves(it, seed), np.stack([0.4 + np.sin(y), 0.2 + 0 * x, np.cos(x - y)])
     begin(it, u)
