@@ -52,7 +52,7 @@ def _terms(tree: Tree) -> list[_Term] | None:
     uses = of_tree(tree).variables
     if "t" not in uses:
         return [_Term(1.0, tree)]
-    if uses == {"t"} and (isinstance(tree, str) or tree[0] not in ("*", "/", "neg")):
+    if not isinstance(tree, tuple) or (uses == {"t"} and tree[0] not in ("*", "/", "neg")):
         return [_Term(tree, 1.0)]
     op, *children = tree
     if op in ("sin", "cos", "exp"):
@@ -75,7 +75,7 @@ def _combined(op: str, left: list[_Term], right: Sequence[_Term] = ()) -> list[_
     (divisor, *more) = right
     if op == "/" and not more:
         return [_Term(_over(f, divisor.f), _over(g, divisor.g)) for f, g in left]
-    if op == "**" and len(left) == 1 and divisor.g in map(float, range(17)):
+    if op == "**" and len(left) == 1 and isinstance(divisor.g, float) and divisor.g in range(17):
         f, g = left[0]
         return [_Term(("**", f, divisor.g), ("**", g, divisor.g))]
     return None

@@ -260,9 +260,8 @@ def line(cell: Cell, verdict: Verdict) -> str:
 def main() -> None:
     """The map, then every cell, then how many of each mark."""
     found = list(tables(*sys.argv[1:2]))
-    print(
-        "\nmark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re,position,stretch,pull,halved,finer,iterations,until,finer,words"
-    )
+    keys = "mark,build,fluid,omega dt,eta,EA,N,ds/h,A1/A2,a/L,Re"
+    print(f"\n{keys},position,stretch,pull,halved,finer,iterations,until,finer,words")
     for cell, verdict in found:
         print(line(cell, verdict))
     print("\n" + ", ".join(f"{mark} {count}" for mark, count in Counter(v.mark for _, v in found).most_common()))
