@@ -1,7 +1,7 @@
 """Expressions in time and space as sums of products f(t) g(x, y, z): a flow that is one is put on a grid once.
 
-Sums, products, quotients and whole powers are taken apart; of sin, cos and exp, whose argument is a(x, y, z) + b(t) as
-a travelling wave's is, by the addition theorems. What else mixes time and place is not.
+Sums, products, quotients and whole powers are taken apart, and sin and cos of a(x, y, z) + b(t), as in travelling
+waves, by the addition theorems; not exp, whose two factors may overflow. What else mixes time and place is not.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import NamedTuple
 from .expressions import Expression, Tree, of_tree
 
 MOST = 4  # products of a flow, each of which is a whole field
+LONGEST = 64  # of those that are looked at on the way there
 
 
 class Product(NamedTuple):
@@ -55,7 +56,7 @@ def _terms(tree: Tree) -> list[_Term] | None:
     if not isinstance(tree, tuple) or (uses == {"t"} and tree[0] not in ("*", "/", "neg")):
         return [_Term(tree, 1.0)]
     op, *children = tree
-    if op in ("sin", "cos", "exp"):
+    if op in ("sin", "cos"):
         return _of_a_sum(op, children[0])
     if op not in ("+", "-", "*", "/", "**", "neg"):
         return None
@@ -70,9 +71,9 @@ def _combined(op: str, left: list[_Term], right: Sequence[_Term] = ()) -> list[_
         return [_Term(f, ("neg", g)) for f, g in left]
     if op in ("+", "-"):
         return left + (list(right) if op == "+" else [_Term(f, ("neg", g)) for f, g in right])
-    if op == "*":
+    if op == "*" and len(left) * len(right) <= LONGEST:
         return [_Term(_times(a.f, b.f), _times(a.g, b.g)) for a in left for b in right]
-    (divisor, *more) = right
+    divisor, *more = right
     if op == "/" and not more:
         return [_Term(_over(f, divisor.f), _over(g, divisor.g)) for f, g in left]
     if op == "**" and len(left) == 1 and isinstance(divisor.g, float) and divisor.g in range(17):
@@ -82,7 +83,7 @@ def _combined(op: str, left: list[_Term], right: Sequence[_Term] = ()) -> list[_
 
 
 def _of_a_sum(op: str, argument: Tree) -> list[_Term] | None:
-    """sin, cos or exp of a(x, y, z) + b(t)."""
+    """sin or cos of a(x, y, z) + b(t)."""
     a: Tree = 0.0
     b: Tree = 0.0
     for f, g in _terms(argument) or [_Term("t", "x")]:
@@ -92,8 +93,6 @@ def _of_a_sum(op: str, argument: Tree) -> list[_Term] | None:
             b = ("+", b, ("*", f, g))
         else:
             return None
-    if op == "exp":
-        return [_Term(("exp", b), ("exp", a))]
     other = "cos" if op == "sin" else "sin"
     second: Tree = (other, a) if op == "sin" else ("neg", (other, a))
     return [_Term(("cos", b), (op, a)), _Term(("sin", b), second)]

@@ -24,7 +24,7 @@ SUMS = [  # and how many products they are
     (["cos(y) + sin(t)", "0", "cos(x)"], 2),
     (["sin(2*y - 3*t)", "0", "0"], 2),
     (["sin(2*(y - 3*t))", "cos(2*(x - 3*t)) - x", "0"], 3),
-    (["exp(-t - x**2)", "(2*exp(-t)*x)**2/(1 + t)", "-(y*t)"], 3),
+    (["exp(-t)*exp(-(x**2))", "(2*exp(-t)*x)**2/(1 + t)", "-(y*t)"], 3),
     (["0", "(cos(y) - sin(t))*(x - exp(t))", "0"], 4),
     (["step(t - 1)*cos(y)", "min(t, 1)*max(x, y)", "0"], 2),
 ]
@@ -36,6 +36,8 @@ MIXED = [
     "(x + t)**2",
     "where(x < t, 1, 2)",
     "tan(x + t)",
+    "exp(x - t)",
+    "*".join(["(x + t)"] * 60),
 ]
 
 
