@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .along import alone
+from .assemble_profiles import alone
 from .errors import CaseError
 
 if TYPE_CHECKING:

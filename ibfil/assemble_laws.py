@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import laws
-from .along import alone, along, field, half
+from .assemble_profiles import alone, along, field, half
 from .case_filament import ZERO, Stiffening, TwoWell
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from .along import alone
+from .assemble_profiles import alone
 from .contact_search import Pairs, Segments, closest, search
 from .errors import CaseError, Stopped
 from .geometry import Geometry

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import assemble, assemble_grid
+from . import assemble_fluid, assemble_grid
 from .frames import FilamentFrame, Frame
 from .loads import EndMoment
 
@@ -120,7 +120,7 @@ class Diagnostics:
         """What the fluid turns into heat: F.(u - u0) of drag; eta int |grad u|^2 of a grid, and the nodes' side."""
         force, shape, time = now.force, now.state.shape, now.state.time
         if self.grid is None:
-            flow = assemble.flow(self.case)
+            flow = assemble_fluid.flow(self.case)
             carried = 0.0 if flow is None else float(np.sum(force[:, :3] * flow(shape.r, time)))
             return {"dissipation": float(np.sum(now.velocity * force)) - carried}
         heat, power = self._grid().dissipation(*self._pushes(now))
@@ -132,7 +132,7 @@ class Diagnostics:
         """What makes fields, made when it is first asked for."""
         assert self.grid is not None
         if self._fields is None:
-            self._fields = assemble.fields(self.case, self.fluid, self.grid)
+            self._fields = assemble_fluid.fields(self.case, self.fluid, self.grid)
         return self._fields
 
     def _pushes(self, now: Instant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, assemble_grid, shapes, timescales
+from . import assemble_fluid, assemble_grid, shapes, timescales
 
 if TYPE_CHECKING:
     from .case_schema import Case
@@ -53,7 +53,7 @@ def _rod(simulation: Simulation, filament) -> dict[str, float]:
             out["wavelength/h"] = 2 * np.pi / wave / grid.spacing
     elif filament.radius is not None:
         out["a/L"] = float(np.max(filament.radius.bind("s", "t")(0.5 * length, 0.0))) / length
-    matched = assemble.matching(case, filament)
+    matched = assemble_fluid.matching(case, filament)
     if matched is not None:
         out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
         out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
@@ -273,7 +273,7 @@ def _of_run(simulation: Simulation) -> list[str]:
 
 def _of_flow(simulation: Simulation) -> list[str]:
     """A background flow on a periodic box that differs from face to face."""
-    flow, grid = assemble.flow(simulation.case), simulation.grid
+    flow, grid = assemble_fluid.flow(simulation.case), simulation.grid
     if flow is None or grid is None:
         return []
     places = np.random.default_rng(0).uniform(-0.5, 0.5, (64, 3)) * grid.box

@@ -43,14 +43,14 @@ class FlowOfForces:
     """u0 + J L^-1 S F: one solve on the run's own grid, whatever the number of points."""
 
     def __init__(self, run: RunFile) -> None:
-        from . import assemble, assemble_grid
+        from . import assemble_fluid, assemble_grid
         from .grid import Grid
         from .stokes import StokesSolve
 
         self._run, case = run, run.case
         assert case.fluid.box is not None
         self._grid = Grid(case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case))
-        self._kernel, self._background = assemble_grid.kernel(case), assemble.flow(case)
+        self._kernel, self._background = assemble_grid.kernel(case), assemble_fluid.flow(case)
         self._solve = StokesSolve(self._grid, case.fluid.viscosity, case.compute.threads, "FFTW_ESTIMATE")
 
     def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, failures, timescales
+from . import assemble, assemble_fluid, failures, timescales
 from .diagnostics import Diagnostics, Instant
 from .errors import CaseError, RunFailed
 from .fluid import Held
@@ -39,7 +39,7 @@ class Simulation:
         self._wisdom = wisdom
         if case.fluid.model != "rft":
             self._learn()
-        self.fluid, self.method, self.grid = assemble.fluid(case, self._rods)
+        self.fluid, self.method, self.grid = assemble_fluid.fluid(case, self._rods)
         self._diagnostics = Diagnostics(case, self._rods, self.fluid, self.grid)
         self._noise = assemble.noise(case, self._rods)
         self._stepper = assemble.stepper(case, self._noise)
@@ -90,7 +90,7 @@ class Simulation:
     @property
     def method_seconds(self) -> dict[str, float]:
         """Estimated seconds of a step by each method the fluid has, from counts."""
-        return assemble.method_seconds(self.case, self._rods, self.grid)
+        return assemble_fluid.method_seconds(self.case, self._rods, self.grid)
 
     @property
     def groups(self) -> dict[str, float]:
@@ -151,7 +151,7 @@ class Simulation:
         if self.case.fluid.model != "rft":
             return 4 * np.pi * eta
         radius = None if filament.radius is None else np.atleast_1d(filament.radius.bind("s", "t")(0.0, 0.0))
-        return assemble.drag_coefficients(self.case, filament, radius)[0]
+        return assemble_fluid.drag_coefficients(self.case, filament, radius)[0]
 
     def bending_time(self) -> float:
         """Relaxation time of the slowest bending mode of any filament."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble, banded
+from . import assemble_fluid, banded
 from .assemble_loads import triple
 from .expressions import Expression
 from .fluid import Fluid, Held
@@ -74,7 +74,7 @@ def cycles(simulation: Simulation) -> list[float]:
             rates += _rates_of_end(held, end)
     if any("t" in e.variables for f in case.filaments.values() for e in _in_loads(f)):
         rates.append(angular_rate(partial(_applied, simulation), end))
-    flow = assemble.flow(case)
+    flow = assemble_fluid.flow(case)
     if flow is not None and any("t" in e.variables for e in case.fluid.flow or ()):
         rates.append(angular_rate(partial(flow, simulation.start.r), end))
     return [rate for rate in rates if rate > 0]
@@ -92,7 +92,7 @@ def pushes(simulation: Simulation) -> list[float]:
         if isinstance(load, (Follower, Dead, Place, BodyForce)):
             size = max(float(np.linalg.norm(_force(simulation, load, t), axis=1).sum()) for t in times)
             rates.append(2 * np.pi * size / slowest)
-    flow = assemble.flow(case)
+    flow = assemble_fluid.flow(case)
     if flow is not None:
         for name, filament in case.filaments.items():
             r = simulation.start.r[simulation.nodes(name)]

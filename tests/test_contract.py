@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scenes import scene
 
-from ibfil import assemble
+from ibfil import assemble, assemble_fluid
 from ibfil.fluid import Fluid, Held, Response
 from ibfil.mechanics import Mechanics
 
@@ -102,7 +102,7 @@ def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2
     if not any("twisting" in rod for rod in rods.values()):
         fluid = {key: value for key, value in fluid.items() if key != "rotation"}
     stacked = assemble.rods(scene(rods, fluid))
-    made, _, _ = assemble.fluid(scene(rods, fluid), stacked)
+    made, _, _ = assemble_fluid.fluid(scene(rods, fluid), stacked)
     mechanics, rng = stacked.mechanics, np.random.default_rng(0)
     n, m = len(stacked.s), mechanics.unknowns
     held = mechanics.held(*BETWEEN)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scenes import run, scene, slopes, twisting_rod
 
-from ibfil import assemble, banded, rft, stepping
+from ibfil import assemble, assemble_fluid, banded, rft, stepping
 from ibfil.case import Case
 from ibfil.ends import EndOf, HeldEnds, spinning, steady, turned
 from ibfil.fluid import Held
@@ -117,7 +117,7 @@ def test_a_spun_clamp_turns_at_its_rate_and_its_node_does_not_move(scheme) -> No
 def steps(case: Case, scheme: stepping.Stepper, dt: float, count: int) -> Iterator[tuple[State, Step]]:
     """The steps of a case, each with the state it starts from."""
     rods = assemble.rods(case)
-    fluid, _, _ = assemble.fluid(case, rods)
+    fluid, _, _ = assemble_fluid.fluid(case, rods)
     shape = rods.start
     state = State(0.0, shape, np.zeros((len(shape.r), rods.mechanics.unknowns)), 0.0)
     for _ in range(count):

@@ -11,7 +11,7 @@ import platformdirs
 import pytest
 from scenes import scene
 
-from ibfil import assemble, matched
+from ibfil import assemble, assemble_fluid, matched
 from ibfil.case import idle_keys
 from ibfil.errors import CaseError
 from ibfil.grid import Grid
@@ -196,7 +196,7 @@ def case(fluid=GRID, rods=None, matched=0.5, model="rft", **more):
 def test_the_drag_of_a_case_is_that_of_a_straight_rod_with_its_spacing_in_its_grid():
     """0.5 of a rod with 20 segments a unit length is SMALL; and drag is proportional to the viscosity."""
     stacked = assemble.rods(case(viscosity=3.0))
-    drag = assemble.drag(case(viscosity=3.0), stacked)
+    drag = assemble_fluid.drag(case(viscosity=3.0), stacked)
     expected = measure(SMALL)
     assert drag.perp == pytest.approx(3.0 * expected.perp * stacked.mechanics.mesh.volume, rel=1e-12)
     assert drag.par == pytest.approx(3.0 * expected.par * stacked.mechanics.mesh.volume, rel=1e-12)
@@ -205,7 +205,7 @@ def test_the_drag_of_a_case_is_that_of_a_straight_rod_with_its_spacing_in_its_gr
 def test_each_filament_has_its_own():
     two = {"coarse": ROD, "fine": {**ROD, "nodes": 41, "position": [0, 0.5, 0]}}
     made = case(rods=two)
-    coarse, fine = (assemble.matching(made, made.filaments[name]) for name in two)
+    coarse, fine = (assemble_fluid.matching(made, made.filaments[name]) for name in two)
     assert coarse == measure(SMALL)
     assert fine == measure(Rod(0.5, 21, SMALL.box, SMALL.cells, SMALL.kernel, SMALL.slip))
     found = groups(Simulation(made))
@@ -215,7 +215,7 @@ def test_each_filament_has_its_own():
 
 def test_thickness_stands_for_cells():
     by_thickness = case(fluid={"box": [1.6, 1.6, 1.6], "thickness": 0.0553})
-    assert assemble.matching(by_thickness, by_thickness.filaments["rod"]) == measure(SMALL)
+    assert assemble_fluid.matching(by_thickness, by_thickness.filaments["rod"]) == measure(SMALL)
 
 
 def test_spin_is_against_the_rods_own_drag():
@@ -223,7 +223,7 @@ def test_spin_is_against_the_rods_own_drag():
     made = case(rods={"rod": twisting}, viscosity=2.0)
     stacked = assemble.rods(made)
     expected = 4 * np.pi * 2.0 * 0.02**2 * stacked.mechanics.mesh.volume
-    assert assemble.drag(made, stacked).spin == pytest.approx(expected, rel=1e-12)
+    assert assemble_fluid.drag(made, stacked).spin == pytest.approx(expected, rel=1e-12)
 
 
 def test_check_and_banner_tell_the_match():
@@ -250,7 +250,7 @@ def test_on_the_grid_itself_nothing_is_matched(monkeypatch):
     """Grid fluids take of the drag its spin alone."""
     monkeypatch.setattr(matched, "measure", never)
     made = case(model="stokes", rods={"rod": {**ROD, "twisting": 1.0, "radius": 0.02}})
-    assert assemble.matching(made, made.filaments["rod"]) is None
+    assert assemble_fluid.matching(made, made.filaments["rod"]) is None
     Simulation(made)
 
 
@@ -310,7 +310,7 @@ def test_a_case_in_rft_takes_its_spin_from_the_grid_where_rotation_is_grid():
     for rotation in ("local", "grid"):
         case = scene({"rod": rod}, {**fluid, "rotation": rotation}, viscosity=2.0)
         filament = case.filaments["rod"]
-        spins[rotation] = float(assemble.drag_coefficients(case, filament, np.full(11, 0.1))[2][0])
+        spins[rotation] = float(assemble_fluid.drag_coefficients(case, filament, np.full(11, 0.1))[2][0])
         assert ("fluid.rotation" in idle_keys(case)) == (rotation == "local")
     matched_rod = Rod(0.5, 6, (1.6,) * 3, (16,) * 3, "peskin4", 0.01, 0.1)
     assert spins["local"] == pytest.approx(8 * np.pi * 0.01)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scenes import rms, run, scene, slopes, swimmer, twisting_rod
 
-from ibfil import assemble, banded, rft
+from ibfil import assemble, assemble_fluid, banded, rft
 from ibfil.case import Case
 from ibfil.errors import RunFailed
 from ibfil.geometry import Geometry
@@ -111,7 +111,7 @@ def test_bdf2_is_second_order_at_steps_that_change_all_the_time(build: Build) ->
     """Each second step is half as long: the formula for a constant step would be first order."""
     exact = reference(build)
     rods = assemble.rods(build(end=END, step=END))
-    fluid, _, _ = assemble.fluid(build(end=END, step=END), rods)
+    fluid, _, _ = assemble_fluid.fluid(build(end=END, step=END), rods)
     shape = rods.start
     positions, directors = [], []
     for count in (40, 80, 160):
@@ -155,7 +155,7 @@ def test_size_and_viscosity_and_stiffness_drop_out(build: Build, scheme: str) ->
 def test_newtons_iteration_is_bounded_and_says_so() -> None:
     case = swimming(end=END, step=END / 40)
     rods = assemble.rods(case)
-    fluid, _, _ = assemble.fluid(case, rods)
+    fluid, _, _ = assemble_fluid.fluid(case, rods)
     state = State(0.0, rods.start, np.zeros((21, 3)), 0.0)
     with pytest.raises(NotConverged, match="1 iteration"):
         Implicit(2, most=1).step(rods.mechanics, fluid, state, 0.3)
@@ -173,8 +173,8 @@ def test_a_step_solves_its_own_equation_to_the_tolerance(build: Build) -> None:
     case = build(end=END, step=END / 20)
     rods = assemble.rods(case)
     mechanics, n = rods.mechanics, len(rods.start.r)
-    fluid, _, _ = assemble.fluid(case, rods)
-    drag = assemble.drag(case, rods)
+    fluid, _, _ = assemble_fluid.fluid(case, rods)
+    drag = assemble_fluid.drag(case, rods)
     state = State(0.0, rods.start, np.zeros((n, mechanics.unknowns)), 0.0)
     for _ in range(15):
         before, step = state, Implicit(1).step(mechanics, fluid, state, END / 20)
@@ -272,7 +272,7 @@ def dense_limit(simulation: Simulation) -> float:
     _, moment = mechanics.forces(shape, simulation.time)
     k = banded.dense(mechanics.stiffness(shape, shape, moment, simulation.time, False))
     n, m = k.shape[:2]
-    drag = assemble.drag(simulation.case, assemble.rods(simulation.case))
+    drag = assemble_fluid.drag(simulation.case, assemble.rods(simulation.case))
     for i in range(n):
         z = np.eye(m)
         e3 = shape.e3[i]
