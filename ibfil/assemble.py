@@ -158,9 +158,9 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> S
     forces, names = loads(filaments, nodes, s, mesh, positions), tuple(p.name for p in placed)
     touching = None
     if case.contact is not None:
-        from . import contact
+        from .assemble_contact import contact
 
-        touching = contact.build(case, names, filaments, nodes, s)
+        touching = contact(case, names, filaments, nodes, s)
         forces += touching.loads()
     mechanics = kind(mesh, law, stretching, free, ends, forces, unknowns, length)
     start = mechanics.start(np.concatenate(positions), np.concatenate([p.e1 for p in placed]))

@@ -22,9 +22,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from .assemble_profiles import alone
 from .contact_search import Pairs, Segments, closest, search
-from .errors import CaseError, Stopped
+from .errors import Stopped
 from .geometry import Geometry
 from .stepping import NotConverged, State
 from .variation import Variation
@@ -32,8 +31,6 @@ from .variation import Variation
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .case_filament import Filament
-    from .case_schema import Case
     from .mechanics import Load
 
 
@@ -238,32 +235,3 @@ class Repulsion:
             variation.position(nodes, rows, shift)
             if shift:
                 variation.position(nodes + 1, rows, -1)
-
-
-def build(
-    case: Case, names: Sequence[str], filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray
-) -> Contact:
-    """The search of a case with [contact]. Raises CaseError where a periodic box is too small for its distance."""
-    given = case.contact
-    assert given is not None
-    parts: list[tuple[np.ndarray, ...]] = []
-    for number, (filament, where) in enumerate(zip(filaments, nodes, strict=True)):
-        here, first = s[where], np.arange(where.start, where.stop - 1)
-        if given.distance is not None:
-            radius = np.full(len(first), 0.5 * given.distance)
-        else:
-            assert filament.radius is not None
-            thick = alone(filament.radius, here)
-            radius = 0.5 * (thick[1:] + thick[:-1])
-        parts.append((first, here[:-1], here[1:], np.full(len(first), number), radius))
-    segments = Segments(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-    box = np.zeros(3)
-    if case.fluid.model != "rft":
-        box[:] = case.fluid.box
-        widest, longest = 2 * float(np.max(segments.radius)), float(np.max(segments.end - segments.begin))
-        reach = (2 if given.action == "repel" else 1) * widest + longest
-        if reach > 0.5 * np.min(box):
-            allowed = "so much that with a segment's length it reaches less than half of fluid.box"
-            raise CaseError([f"{case.file}: contact.distance: found {widest:g}; allowed: {allowed}"])
-    offsets = [where.start for where in nodes]
-    return Contact(segments, names, offsets, box, given.action, given.strength)
