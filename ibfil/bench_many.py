@@ -45,7 +45,7 @@ def measure(count: int, nodes: int, cells: int, steps: int) -> dict[str, float |
     """Seconds a node and step; the bytes that `check` tells beforehand, and the peak of this process."""
     import resource
 
-    from . import krylov, report
+    from . import budget, krylov
     from .case import parse_case
     from .simulation import Simulation
 
@@ -58,7 +58,7 @@ def measure(count: int, nodes: int, cells: int, steps: int) -> dict[str, float |
         return found
 
     simulation = Simulation(parse_case(scene(count, nodes, cells), "bench"))
-    told = sum(report.memory(simulation).values()) + LIBRARIES
+    told = sum(budget.memory(simulation).values()) + LIBRARIES
     simulation.advance(FIRST * STEP, lambda: None)
     krylov.solve = counted
     began = time.perf_counter()

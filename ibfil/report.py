@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble_grid, costs
+from . import assemble_grid
+from .budget import disk, flow_parts, memory, shares, terms
 from .case import idle_keys
 from .case_schema import Matched
 from .groups import groups, warnings
 from .simulation import Simulation
-from .terms import shares, terms
 
 if TYPE_CHECKING:
     from .case import Case
     from .case_schema import Contact, Thermal
-    from .navier_stokes import Part
 
 
 def report(case: Case) -> str:
@@ -153,61 +152,6 @@ def _bytes(count: float) -> str:
     return f"{count:.3g} GiB"
 
 
-def memory(simulation: Simulation) -> dict[str, float]:
-    """Bytes of the large arrays, by what they are for."""
-    case, n, m = simulation.case, len(simulation.arclength), simulation.mechanics.unknowns
-    out = {"band matrix": 8.0 * n * m * m * (2 * simulation.mechanics.profile.width + 1)}
-    if simulation.grid is None:
-        return out
-    from .kernels import KERNELS
-
-    cells = simulation.grid.cells
-    rim, parts = KERNELS[case.fluid.kernel].points - 1, assemble_grid.parts(case)
-    number = 4.0 if case.fluid.precision == "single" else 8.0
-    out["mobility table"] = number * (15 if parts == 4 else 6) * float(np.prod(cells // 2 + 1 + 2 * rim))
-    if simulation.method == "averaged":
-        out["averaged table"] = 8.0 * 6 * float(np.prod(2 * (cells // 2 + 5)))
-    if simulation.method == "krylov":
-        blocks = [len(f.position) for f in simulation.frame().filaments.values()]
-        out["preconditioner"] = sum(8.0 * (parts * k) ** 2 for k in blocks) + 2 * out["band matrix"]
-        out["Krylov vectors"] = 60 * 8.0 * parts * n
-    else:
-        out["dense matrices"] = costs.dense_bytes(n, parts)
-    if case.fluid.model == "navier-stokes":
-        modes = 3 * 2 * number * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
-        out["past of the fluid, as large in a checkpoint"] = 4 * modes
-        out["its transforms"] = modes + 4 * modes
-        out["mobility table"] *= 2  # of Euler's first step, and of BDF2's
-        if case.fluid.flow is not None:
-            out["the background flow"] = _flow_fields(case) * 6 * 8.0 * float(np.prod(cells))
-    elif simulation.method not in ("table", "averaged") or case.output.grid_every is not None:
-        out["fields and their transforms"] = (parts - 2) * 2 * 3 * 8.0 * float(np.prod(cells))
-    return out
-
-
-def _flow_parts(case: Case) -> list[Part]:
-    """What a background flow is the sum of; nothing where it is no sum that is seen."""
-    from .assemble_inertia import flow_parts
-
-    return flow_parts(case) or []
-
-
-def _flow_fields(case: Case) -> int:
-    """How many fields a background flow of a fluid with inertia takes: its parts and their sum."""
-    parts = _flow_parts(case)
-    return len(parts) + (len(parts) != 1 or parts[0].factor is not None)
-
-
-def _disk(simulation: Simulation) -> float:
-    case, n = simulation.case, len(simulation.arclength)
-    outputs = len(case.output.times or ()) or case.time.end / (case.output.every or case.time.end) + 1
-    size = outputs * n * 8.0 * (20 if simulation.mechanics.unknowns == 3 else 26)
-    if simulation.grid is not None and case.output.grid_every is not None:
-        points = float(np.prod(np.ceil(simulation.grid.cells / case.output.grid_stride)))
-        size += (case.time.end / case.output.grid_every + 1) * points * 12.0 * len(case.output.fields)
-    return size
-
-
 def _costs(simulation: Simulation) -> list[str]:
     case = simulation.case
     unknowns = simulation.mechanics.unknowns
@@ -226,12 +170,12 @@ def _costs(simulation: Simulation) -> list[str]:
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
-    if case.fluid.model == "navier-stokes" and case.fluid.flow is not None and not _flow_parts(case):
+    if case.fluid.model == "navier-stokes" and case.fluid.flow is not None and not flow_parts(case):
         lines.append(
             "fluid.flow is no sum of at most 4 products f(t) g(x, y, z) that is seen: it is put on the grid each step, "
             "which takes as long as the step itself or twice that"
         )
-    lines.append(f"disk at most {_bytes(_disk(simulation))}, fields compressed")
+    lines.append(f"disk at most {_bytes(disk(simulation))}, fields compressed")
     steps = case.time.end / simulation.step_length
     seconds = steps * simulation.method_seconds[simulation.method]
     if simulation.grid is not None:

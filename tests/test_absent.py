@@ -7,12 +7,12 @@ import pytest
 from made_run import BENT
 
 from ibfil import fields, loop, mechanics, thermal, transforms
+from ibfil.budget import memory, shares, terms
 from ibfil.case import parse_case
 from ibfil.contact import Contact
-from ibfil.report import memory, report
+from ibfil.report import report
 from ibfil.running import run
 from ibfil.simulation import Simulation
-from ibfil.terms import shares, terms
 
 BOX = ("fluid.box=[2.0, 2.0, 2.0]", "fluid.cells=[16, 16, 16]", "time.end=0.01", "output.every=0.002")
 GRID = ("fluid.model=stokes",)

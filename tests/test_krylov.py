@@ -5,9 +5,9 @@ import pytest
 from scenes import swimmer
 
 from ibfil import krylov
+from ibfil.budget import memory
 from ibfil.case import parse_case
 from ibfil.errors import CaseError
-from ibfil.report import memory
 from ibfil.simulation import Simulation
 
 MANY = """
