@@ -277,7 +277,7 @@ def _end(result: Result, changes: str = "") -> int:
 
 def _check(arguments: argparse.Namespace) -> int:
     case = _read(arguments.words)
-    from .report import report
+    from .check import report
 
     print(report(case))
     return DONE

@@ -132,7 +132,7 @@ def compare(
 def _column(
     outcome: Outcome, runs: Mapping[str, RunFile], first: str, window: Window, own: Mapping[str, tuple[str, ...]]
 ) -> Column:
-    from .report import share_lines
+    from .check import share_lines
     from .simulation import Simulation
 
     name = outcome.member.name
@@ -184,7 +184,7 @@ def driven_period(case: Case) -> float | None:
 
 def only_here(cases: Mapping[str, Case]) -> dict[str, tuple[str, ...]]:
     """Return for each fluid what it models that not all of them do."""
-    from .report import modelled
+    from .check import modelled
 
     lines = {name: modelled(case) for name, case in cases.items()}
     everywhere = set.intersection(*(set(found) for found in lines.values()))

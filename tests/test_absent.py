@@ -9,8 +9,8 @@ from made_run import BENT
 from ibfil import fields, loop, mechanics, thermal, transforms
 from ibfil.budget import memory, shares, terms
 from ibfil.case import parse_case
+from ibfil.check import report
 from ibfil.contact import Contact
-from ibfil.report import report
 from ibfil.running import run
 from ibfil.simulation import Simulation
 

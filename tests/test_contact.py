@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from contact_scenes import GRID, case, crossed, ran
 
+from ibfil.check import absent, modelled
 from ibfil.contact import Contact
 from ibfil.errors import CaseError
 from ibfil.groups import warnings
-from ibfil.report import absent, modelled
 from ibfil.simulation import Simulation
 
 ROOT = Path(__file__).parent.parent

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import RFT, scene
 
-from ibfil.report import modelled
+from ibfil.check import modelled
 from ibfil.simulation import Simulation
 
 PERP = 4 * np.pi

@@ -13,9 +13,9 @@ from scipy.special import gamma
 
 from ibfil import mobility
 from ibfil.case_checks import SUPPORT
+from ibfil.check import report
 from ibfil.grid import Grid
 from ibfil.kernels import KERNELS, Kernel
-from ibfil.report import report
 
 ALL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 OFFSETS = np.concatenate([np.arange(16) / 16, np.random.default_rng(0).random(200)])

@@ -23,7 +23,7 @@ CASE = {"expressions", *with_prefix("case")}
 FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "torque_coupling", "condensation", "immersed"}
 RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", *with_prefix("observables"), "expectations"}
-LOOKING = {"show", "figure", "vtk", "vtk_data", "analysis", "render", "stage", "verify", "report", "bench", "cli"}
+LOOKING = {"show", "figure", "vtk", "vtk_data", "analysis", "render", "stage", "verify", "check", "bench", "cli"}
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}
 
 

@@ -13,12 +13,12 @@ from scenes import scene
 
 from ibfil import assemble, assemble_fluid, matched
 from ibfil.case import idle_keys
+from ibfil.check import report
 from ibfil.errors import CaseError
 from ibfil.grid import Grid
 from ibfil.groups import groups, warnings
 from ibfil.kernels import KERNELS
 from ibfil.matched import Match, Rod, directions, measure, places
-from ibfil.report import report
 from ibfil.simulation import Simulation
 
 SMALL = Rod(0.5, 11, (1.6, 1.6, 1.6), (32, 32, 32), "peskin4", 0.01)

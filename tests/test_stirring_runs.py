@@ -10,10 +10,10 @@ import pytest
 from scenes import RIBBON, STOKES, rms, run, scene, slopes, twisting_rod
 
 from ibfil.case import Case, parse_case
+from ibfil.check import report
 from ibfil.geometry import Geometry
 from ibfil.kernels import PESKIN4
 from ibfil.observe import observers
-from ibfil.report import report
 from ibfil.simulation import Simulation
 
 STIRRED: dict[str, Any] = {**STOKES, "rotation": "grid"}

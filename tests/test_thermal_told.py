@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from thermal_scenes import ROD, scene
 
-from ibfil import report, timescales
+from ibfil import check, timescales
 from ibfil.errors import CaseError
 from ibfil.groups import groups, warnings
 from ibfil.simulation import Simulation
@@ -36,13 +36,13 @@ def test_a_tolerance_is_refused():
 
 def test_check_says_what_is_kicked_and_how_stiff_the_rod_is_against_it():
     case = scene({"rod": {**ROD, "twisting": 1.0}}, 0.02)
-    assert any("thermal forces and twist moments, kT = 0.02, seed 1" in line for line in report.modelled(case))
-    assert not any("thermal" in line for line in report.absent(case))
+    assert any("thermal forces and twist moments, kT = 0.02, seed 1" in line for line in check.modelled(case))
+    assert not any("thermal" in line for line in check.absent(case))
     without = scene({"rod": {**ROD, "twisting": 1.0}}, 0.02, twist=False)
-    assert any("thermal forces, kT" in line for line in report.modelled(without))
-    assert "thermal twist moments" in report.absent(without)
+    assert any("thermal forces, kT" in line for line in check.modelled(without))
+    assert "thermal twist moments" in check.absent(without)
     assert groups(Simulation(case))["A/(kT L)"] == pytest.approx(50)
-    assert "linearised trapezoid" in report.report(case)
+    assert "linearised trapezoid" in check.report(case)
 
 
 @pytest.mark.parametrize(
