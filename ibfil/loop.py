@@ -15,8 +15,7 @@ from . import checkpoint
 from .errors import Interrupted, RunFailed, Stopped
 from .expectations import Check, check
 from .observe import Observers, Summary
-from .pace import Pace
-from .progress import Progress, Signals
+from .progress import Pace, Progress, Signals
 from .record import checkpoint_path
 from .recorder import GridPlace, Meaning, Recorder, record_end
 from .schedule import SAME, Due, due_times

@@ -1,4 +1,9 @@
-"""How far a run is: a bar on a terminal, a line now and then elsewhere. And Ctrl-C between two steps."""
+"""How far a run is, how fast it steps, and Ctrl-C between two steps.
+
+Progress is a bar on a terminal, a line now and then elsewhere. The pace, which `ibfil trade` puts against the error, is
+taken without start-up: its clocks start when the first step of a process is taken, so that loading, compiling and
+planning are left out, and stand still at outputs; the parts of a run that was cut are added up.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +11,14 @@ import signal
 import sys
 import threading
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
 _LINE_EVERY = 60.0  # seconds at most between two lines
 _TENTHS = 10  # lines of a short run
+_PACE = ("pace_seconds", "pace_processor", "pace_time")  # attributes of a run file
 
 
 class Progress:
@@ -49,6 +56,42 @@ class Progress:
         """Take the bar away."""
         if self._bar is not None:
             self._bar.close()
+
+
+class Pace:
+    """Seconds, processor seconds and simulated time of the steps after the first; ``before`` those of earlier parts."""
+
+    def __init__(self, before: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+        self._before = before
+        self._from: tuple[float, float, float] | None = None
+
+    def step(self, time: float) -> None:
+        """Take note of a step that led to ``time``: the first one starts the clocks."""
+        if self._from is None:
+            self._from = (clock.monotonic(), clock.process_time(), time)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Within it nothing counts."""
+        before = (clock.monotonic(), clock.process_time())
+        yield
+        if self._from is not None:
+            seconds, processor, time = self._from
+            spent = (clock.monotonic() - before[0], clock.process_time() - before[1])
+            self._from = (seconds + spent[0], processor + spent[1], time)
+
+    def attributes(self, time: float) -> dict[str, float]:
+        """Return what the run file keeps, at simulated ``time``."""
+        now = (clock.monotonic(), clock.process_time(), time)
+        since = self._from or now
+        spent = (b + n - s for b, n, s in zip(self._before, now, since, strict=True))
+        return dict(zip(_PACE, spent, strict=True))
+
+
+def pace_of(file: Any) -> tuple[float, float, float]:
+    """Seconds, processor seconds and simulated time noted in an open run file; zeros where there are none."""
+    seconds, processor, time = (float(file.attrs.get(name, 0.0)) for name in _PACE)
+    return seconds, processor, time
 
 
 class Signals:

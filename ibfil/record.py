@@ -22,7 +22,7 @@ import numpy as np
 from . import journal
 from .errors import CaseError
 from .frames import FilamentFrame, Frame
-from .pace import pace_of
+from .progress import pace_of
 
 if TYPE_CHECKING:
     from .case import Case
@@ -264,7 +264,7 @@ class RunFile:
 
     @property
     def pace(self) -> tuple[float, float, float]:
-        """Seconds, processor seconds and simulated time, start-up, compilation and first step left out (pace.py)."""
+        """Seconds, processor seconds and simulated time, without start-up and first step (progress.py)."""
         return pace_of(self._file)
 
     def _attribute(self, name: str) -> str:

@@ -26,7 +26,7 @@ from . import __version__
 from .errors import RunFailed
 from .frames import Frame
 from .journal import Busy, JournaledFile
-from .pace import pace_of
+from .progress import pace_of
 from .record import FORMAT, FORMAT_VERSION, RunFileError, checkpoint_path, journal_path
 from .units import label
 
