@@ -330,7 +330,7 @@ def _show(arguments: argparse.Namespace) -> int:
         if arguments.csv:
             show.write_csv(run, arguments.csv)
         if arguments.plot:
-            from .figure import draw
+            from .show_figure import draw
 
             draw(run, arguments.plot)
     return DONE

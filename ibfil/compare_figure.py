@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .figure import AXES, STYLE, plane_of_motion, with_units
-from .trade_figure import COLOURS, MARKS, save
+from .figure_style import AXES, COLOURS, MARKS, STYLE, plane_of_motion, save, with_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

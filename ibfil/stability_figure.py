@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .figure import STYLE
+from .figure_style import STYLE, save
 from .stability import CLASSES
-from .trade_figure import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

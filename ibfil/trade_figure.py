@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .figure_style import COLOURS, MARKS, STYLE, save
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from .trade import Trade, Tried
 
 MOST = 4  # panels
-# Okabe and Ito: told apart by all eyes; with them the marks, for prints without colour.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-MARKS = "osD^vPX"
 _APART = np.array([0.5, 0.12])  # decades between two texts
 
 
@@ -25,8 +23,6 @@ def draw(made: Trade, path: Path) -> None:
     """Draw the trade into ``path``."""
     import matplotlib
     from matplotlib.figure import Figure
-
-    from .figure import STYLE
 
     measures = made.measures[:MOST]
     with matplotlib.rc_context(STYLE):
@@ -51,12 +47,6 @@ def draw(made: Trade, path: Path) -> None:
             alignment="left",
         )
         save(fig, path)
-
-
-def save(fig: Figure, path: Path) -> None:
-    """Write a figure as a picture, and beside it as PDF, for papers."""
-    fig.savefig(path, dpi=170)
-    fig.savefig(path.with_suffix(".pdf"))
 
 
 def _few_ticks(axes: Axes) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_run import SPEED, make_run
 
-from ibfil import figure, show
+from ibfil import figure_style, show, show_figure
 from ibfil.errors import CaseError
 from ibfil.record import RunFile
 
@@ -120,7 +120,7 @@ def test_durations(seconds, words):
 
 
 def test_figure_shows_all_there_is(run):
-    fig = figure.figure(run)
+    fig = show_figure.figure(run)
     titles = " | ".join(axes.get_title(loc="left") for axes in fig.axes)
     for part in (
         "Shapes",
@@ -145,13 +145,13 @@ def test_figure_shows_all_there_is(run):
 
 def test_figure_of_a_run_cut_at_its_start(tmp_path):
     with RunFile(make_run(tmp_path / "made.h5", until=0.0)) as run:
-        figure.draw(run, tmp_path / "made.png")
+        show_figure.draw(run, tmp_path / "made.png")
     assert (tmp_path / "made.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_flow_panel_has_the_flow_of_the_plane_of_the_filaments(run):
     """The mean of the filaments' wrapped z decides the plane; the speed on it is that of all three components."""
-    axes = next(a for a in figure.figure(run).axes if a.get_title(loc="left").startswith("Flow"))
+    axes = next(a for a in show_figure.figure(run).axes if a.get_title(loc="left").startswith("Flow"))
     mesh = axes.collections[0]
     z = float(axes.get_title(loc="left").split("=")[1].split()[0])
     k = round((z + 0.5) / 0.25)
@@ -161,7 +161,7 @@ def test_flow_panel_has_the_flow_of_the_plane_of_the_filaments(run):
 
 def test_figure_refuses_an_ending_it_cannot_draw(run, tmp_path):
     with pytest.raises(CaseError, match=r"\.png, \.pdf, \.svg"):
-        figure.draw(run, tmp_path / "made.xyz")
+        show_figure.draw(run, tmp_path / "made.xyz")
     assert not list(tmp_path.iterdir())
 
 
@@ -169,18 +169,18 @@ def test_figure_refuses_an_ending_it_cannot_draw(run, tmp_path):
 def test_plane_of_motion_drops_the_axis_of_least_reach(flat, seen):
     positions = np.random.default_rng(1).normal(size=(5, 9, 3))
     positions[..., flat] *= 0.01
-    assert figure.plane_of_motion([positions, positions + 0.001]) == seen
+    assert figure_style.plane_of_motion([positions, positions + 0.001]) == seen
 
 
 def test_a_straight_rod_along_x_is_seen_from_z():
     positions = np.zeros((3, 5, 3))
     positions[..., 0] = np.linspace(0, 1, 5)
-    assert figure.plane_of_motion([positions]) == (0, 1)
+    assert figure_style.plane_of_motion([positions]) == (0, 1)
 
 
 def test_wrapped_breaks_the_line_where_it_leaves_the_box():
     r = np.column_stack([np.array([0.5, 0.9, 1.1, 1.5]), np.zeros(4), np.full(4, -0.25)])
-    got = figure.wrapped(r, origin=np.array([-1.0, -0.5, 0.0]), box=np.array([2.0, 1.0, 0.5]))
+    got = show_figure.wrapped(r, origin=np.array([-1.0, -0.5, 0.0]), box=np.array([2.0, 1.0, 0.5]))
     assert np.isnan(got[3]).all()
     np.testing.assert_allclose(np.delete(got, 3, axis=0)[:, 0], [0.5, 0.9, 1.0, -1.0, -0.9, -0.5])
     np.testing.assert_allclose(np.delete(got, 3, axis=0)[:, 2], 0.25)
@@ -188,17 +188,17 @@ def test_wrapped_breaks_the_line_where_it_leaves_the_box():
 
 def test_a_start_that_dwarfs_the_rest_is_left_out_of_the_scale():
     rest = np.array([1.0, 2.0, 1.5])
-    low, high = figure.limits_without_start([np.append(500.0, rest)])
+    low, high = show_figure.limits_without_start([np.append(500.0, rest)])
     assert 0.5 < low < 1.0
     assert 2.0 < high < 2.5
-    assert figure.limits_without_start([np.append(4.0, rest)]) is None
-    assert figure.limits_without_start([np.append(500.0, [1.0, 1.0, 1.0])]) is None
-    assert figure.limits_without_start([np.append(np.nan, rest)]) is None
+    assert show_figure.limits_without_start([np.append(4.0, rest)]) is None
+    assert show_figure.limits_without_start([np.append(500.0, [1.0, 1.0, 1.0])]) is None
+    assert show_figure.limits_without_start([np.append(np.nan, rest)]) is None
 
 
 @pytest.mark.parametrize(("units", "label"), [("1", "time"), ("", "time"), ("s", "time (s)")])
 def test_labels_have_units_where_there_are_any(units, label):
-    assert figure.with_units("time", units) == label
+    assert figure_style.with_units("time", units) == label
 
 
 def test_a_run_without_observables_fields_or_stretch_is_drawn_too(run):
@@ -214,6 +214,6 @@ def test_a_run_without_observables_fields_or_stretch_is_drawn_too(run):
         arclength=run.arclength,
         filament=run.filament,
     )
-    titles = {axes.get_title(loc="left") for axes in figure.figure(bare).axes}
+    titles = {axes.get_title(loc="left") for axes in show_figure.figure(bare).axes}
     motion = {"speed of the centroid (um/s)", "elastic energy (pN um)"}
     assert titles - {""} - motion == {"Shapes", "Centroid: start (ring) to end (dot)", "power on the fluid (pN um/s)"}

@@ -17,6 +17,7 @@ import numpy as np
 from . import wrapping
 from .energy import elastic_energy
 from .errors import CaseError
+from .figure_style import AXES, COLOURS, STYLE, plane_of_motion, with_units
 from .observe import KINDS
 from .time_series import trapezoid_weights
 from .units import label
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
     from .record import RunFile
 
-AXES = "xyz"
 ENDINGS = (".png", ".pdf", ".svg")
 SHAPES = 14  # shapes drawn of each filament, evenly spaced in time
 SERIES = 3  # observables drawn; the rest are in --csv
@@ -37,17 +37,7 @@ DIAGNOSTICS = {
     "stretch of segments": {"stretch_max": "max", "stretch_min": "min"},
 }
 ARROWS = 22  # arrows along the longer side of the flow panel
-COLOURS = ("#0072B2", "#D55E00", "#009E73")  # x, y, z: told apart by all eyes (Okabe and Ito)
-STYLE = {
-    "font.size": 9,
-    "axes.titlesize": 9.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.8,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "lines.linewidth": 1.4,
-}
+XYZ = COLOURS[:3]  # colours of components, or of filaments
 
 
 def draw(run: RunFile, path: str | Path) -> None:
@@ -89,22 +79,6 @@ def figure(run: RunFile) -> Figure:
         axes.tick_params(labelbottom=row == len(series) - 1)
     axes.set_xlabel(with_units("time", run.case.units.time))
     return fig
-
-
-def with_units(name: str, units: str) -> str:
-    """A label for an axis: the name, and its units where it has any."""
-    return f"{name} ({units})" if units not in ("", "1") else name
-
-
-def plane_of_motion(positions: Sequence[np.ndarray]) -> tuple[int, int]:
-    """The two lab axes, in order, along which the filaments (T, N, 3) reach farthest."""
-    low = np.min([p.min(axis=(0, 1)) for p in positions], axis=0)
-    high = np.max([p.max(axis=(0, 1)) for p in positions], axis=0)
-    reach = high - low
-    # The first of equally short axes counts from z: a straight rod along x is seen in x-y.
-    dropped = 2 - int(np.argmin(reach[::-1]))
-    a, b = (axis for axis in range(3) if axis != dropped)
-    return a, b
 
 
 def _time_colours() -> ListedColormap:
@@ -235,7 +209,7 @@ def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
 def _motion(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
     """Speed of the centroid and elastic energy, a line for each of the first filaments."""
     speeds, energies = {}, {}
-    for name in list(run.filaments)[: len(COLOURS)]:
+    for name in list(run.filaments)[: len(XYZ)]:
         s = run.arclength(name)
         words = name if len(run.filaments) > 1 else ""
         mean = np.einsum("tnc,n->tc", np.asarray(run.filaments[name]["velocity"]), trapezoid_weights(s) / s[-1])
@@ -264,7 +238,7 @@ def _against_time(axes: Axes, run: RunFile, title: str, units: str, lines: dict[
     A start that dwarfs all the rest, as of a shape that has yet to relax, is left out of the scale, and the
     title says so.
     """
-    for (word, values), colour in zip(lines.items(), COLOURS, strict=False):
+    for (word, values), colour in zip(lines.items(), XYZ, strict=False):
         axes.plot(run.time, values, color=colour, label=word)
     if len(lines) > 1:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.0, borderaxespad=0.0)
