@@ -14,10 +14,10 @@ import numpy as np
 
 from .analysis import Run, open_run
 from .errors import CaseError
-from .lettering import Words, bands, lettered
-from .stage import FLOW, QUANTITIES, TIMES, Frame, Scale, Stage, frame_for, quantity
+from .render_lettering import Words, bands, lettered
+from .render_stage import FLOW, QUANTITIES, TIMES, Frame, Scale, Stage, frame_for, quantity
+from .render_viewpoint import viewpoint
 from .units import label
-from .viewpoint import viewpoint
 from .vtk_data import filament_data, rods_of
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """A run as ParaView files.
 
 One .pvd collection with the real times, a .vtp of all filaments for each output, a .vti for each grid field time, and
-a ready scene (paraview_scene.py).
+a ready scene (vtk_scene.py).
 
 Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
 file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
@@ -23,9 +23,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from .errors import CaseError
-from .paraview_scene import write_scene
 from .record import RunFile
 from .vtk_data import PLAIN, View, box_of, field_data, polylines, rods_of
+from .vtk_scene import write_scene
 
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkDataSet

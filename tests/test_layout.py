@@ -23,7 +23,8 @@ CASE = {"expressions", *with_prefix("case")}
 FLUIDS = {"rft", "stokes", "mobility", "grid", "kernels", "transforms", "torque_coupling", "condensation", "immersed"}
 RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", "mechanics", "torque_free", "variation"}
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", *with_prefix("observables"), "expectations"}
-LOOKING = {"show", "show_figure", "vtk", "vtk_data", "analysis", "render", "stage", "verify", "check", "bench", "cli"}
+PICTURES = {"analysis", *with_prefix("vtk"), *with_prefix("render")}
+LOOKING = {*with_prefix("show"), *PICTURES, "verify", "check", "bench", "cli"}
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}
 
 
@@ -78,8 +79,7 @@ def test_a_case_is_data_and_knows_nothing_that_runs_it():
 def test_only_what_draws_loads_what_draws_and_only_when_it_does():
     for name in MODULES:
         assert not imports(name, at_load=True) & (DRAWING - {"vtk"}), name
-        may = "figure" in name or name in ("vtk", "vtk_data", "analysis", "render", "stage", "lettering")
-        if not may:
+        if "figure" not in name and name not in PICTURES:
             assert not imports(name) & (DRAWING - {"vtk"}), name
 
 

@@ -14,10 +14,10 @@ from ibfil import render
 from ibfil.analysis import open_run
 from ibfil.cli import main
 from ibfil.errors import CaseError
-from ibfil.lettering import Words, bands, lettered
 from ibfil.render import Wish
-from ibfil.stage import Scale, frame_for
-from ibfil.viewpoint import viewpoint
+from ibfil.render_lettering import Words, bands, lettered
+from ibfil.render_stage import Scale, frame_for
+from ibfil.render_viewpoint import viewpoint
 
 SIZE = (320, 240)
 draws = pytest.mark.skipif(

@@ -99,7 +99,7 @@ if len(sys.argv) > 1 and sys.argv[-1].endswith(".png"):
 
 def write_scene(collection: Path, run: RunFile) -> Path:
     """Write NAME_paraview.py beside NAME.pvd, looking along the direction of least motion; returns its path."""
-    from .viewpoint import viewpoint
+    from .render_viewpoint import viewpoint
 
     path = collection.with_name(f"{collection.stem}_paraview.py")
     look = viewpoint([np.asarray(columns["position"]) for columns in run.filaments.values()])

@@ -1,4 +1,4 @@
-"""The rods and the flow of a run as pixels: pyvista, no display, one fixed camera. Letters are in lettering.py."""
+"""The rods and the flow of a run as pixels: pyvista, no display, a fixed camera. Letters are in render_lettering.py."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .viewpoint import Viewpoint
+from .render_viewpoint import Viewpoint
 from .vtk_data import filament_data
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
     from PIL.ImageFont import FreeTypeFont
 
-    from .stage import Scale
+    from .render_stage import Scale
 
 INK, LIGHT = (25, 25, 25), (255, 255, 255)
 TOP, FOOT = 0.07, 0.13  # heights of the bands, of the picture's
@@ -97,7 +97,7 @@ def _colour_bar(
     """A strip of the colours with three numbers under it and its words above."""
     from PIL.Image import fromarray
 
-    from .stage import colours
+    from .render_stage import colours
 
     thick = round(0.02 * height)
     x, y = at[0], at[1] + round(0.045 * height)
