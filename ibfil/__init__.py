@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from .analysis import open_run as open
     from .case import Case, parse_case, read_case
     from .errors import CaseError, Interrupted, RunFailed
-    from .members import Member, Outcome, run_members
     from .running import run
     from .simulation import Simulation
+    from .study_members import Member, Outcome, run_members
     from .vtk import write_vtk
 
 __version__ = "0.1.0"
@@ -29,9 +29,9 @@ _HOME = {
     "CaseError": "errors",
     "Interrupted": "errors",
     "RunFailed": "errors",
-    "Member": "members",
-    "Outcome": "members",
-    "run_members": "members",
+    "Member": "study_members",
+    "Outcome": "study_members",
+    "run_members": "study_members",
     "Run": "analysis",
     "open": "analysis:open_run",
     "run": "running",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .fields import GridFields
     from .fluid import Fluid
     from .grid import Grid
-    from .matched import Match
+    from .matched_drag import Match
 
 
 def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None) -> tuple[float, float, np.ndarray]:
@@ -51,16 +51,16 @@ def matching(case: Case, filament: Filament) -> Match | None:
     drag = case.fluid.drag
     if case.fluid.model != "rft" or not isinstance(drag, Matched):
         return None
-    from . import matched
+    from . import matched_drag
 
     box, cells = case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case)
     assert box is not None
     nodes, radius = 1 + round(drag.matched * (filament.nodes - 1) / filament.length), 0.0
     if case.fluid.rotation == "grid" and filament.twisting is not None and filament.radius is not None:
         radius = float(np.mean(alone(filament.radius, np.linspace(0.0, filament.length, filament.nodes))))
-    rod = matched.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip, radius)
+    rod = matched_drag.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip, radius)
     try:
-        return matched.match(rod)
+        return matched_drag.match(rod)
     except ValueError as error:
         allowed = "slip = 0.01, fewer nodes or more cells"
         raise CaseError([f"{case.file}: fluid.drag: {error}; allowed: {allowed}"]) from None
@@ -94,17 +94,17 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     """The fluid of the case, the method chosen, and its grid (None in RFT)."""
     if case.fluid.model == "rft":
         return rft.ResistiveForce(drag(case, stacked), stacked.mechanics.profile, flow(case)), "rft", None
-    from . import immersed, stokes
+    from . import immersed_boundary, stokes
     from .grid import Grid
 
     assert case.fluid.box is not None
     grid, eta = Grid(case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case)), case.fluid.viscosity
-    slip = immersed.slip_mobility(case.fluid.slip, assemble_grid.kernel(case), grid, eta, stacked.spacing)
+    slip = immersed_boundary.slip_mobility(case.fluid.slip, assemble_grid.kernel(case), grid, eta, stacked.spacing)
     against = stacked.mechanics.unknowns == 4 and not assemble_grid.couples_torque(case)
     spin = drag(case, stacked).spin if against else None
     number = np.float32 if case.fluid.precision == "single" else np.float64
     coupled, delta = assemble_grid.coupling(case, stacked), assemble_grid.kernel(case)
-    made = immersed.Immersed(grid, delta, eta, slip, spin, flow(case), stacked.nodes, number, coupled)
+    made = immersed_boundary.Immersed(grid, delta, eta, slip, spin, flow(case), stacked.nodes, number, coupled)
     seconds = method_seconds(case, stacked, grid)
     # The averaged table is an approximation: on request only.
     exact = [name for name in seconds if name != "averaged"]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .assemble import Stacked
     from .case_schema import Case
     from .grid import Grid
-    from .immersed import Coupling
+    from .immersed_boundary import Coupling
     from .kernels import Kernel
 
 
@@ -64,7 +64,7 @@ def couples_torque(case: Case) -> bool:
 
 
 def parts(case: Case) -> int:
-    """How many numbers of a node go through the grid (immersed.Coupling): 3, or 4 with its twist torque."""
+    """How many numbers of a node go through the grid (immersed_boundary.Coupling): 3, or 4 with its twist torque."""
     return 4 if couples_torque(case) else 3
 
 
@@ -90,7 +90,7 @@ def coupling(case: Case, stacked: Stacked) -> Coupling:
 
 def own_mobility(case: Case, stacked: Stacked, grid: Grid) -> np.ndarray:
     """What each node moves by its own force or torque beyond the grid's answer, (n, c): slip, and spin below h."""
-    from . import immersed
+    from . import immersed_boundary
 
-    slip = immersed.slip_mobility(case.fluid.slip, kernel(case), grid, case.fluid.viscosity, stacked.spacing)
+    slip = immersed_boundary.slip_mobility(case.fluid.slip, kernel(case), grid, case.fluid.viscosity, stacked.spacing)
     return coupling(case, stacked).own(slip)

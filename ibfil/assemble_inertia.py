@@ -14,7 +14,7 @@ from .torque_coupling import StirredSolve
 
 if TYPE_CHECKING:
     from .case_schema import Case
-    from .immersed import Immersed
+    from .immersed_boundary import Immersed
     from .separation import Product
 
 

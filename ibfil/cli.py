@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import __version__
+from .cli_studies import add_studies
 from .errors import CaseError, Interrupted, RunFailed
-from .study_cli import add_studies
 from .threads import set_threads
 
 if TYPE_CHECKING:

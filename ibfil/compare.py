@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
+from .compare_quantities import Quantity, Window, quantities
 from .errors import CaseError, RunFailed
-from .members import Member, Outcome, run_members
-from .quantities import Quantity, Window, quantities
 from .record import RunFile
 from .study import measured, numbers, source, write_csv, write_json
+from .study_members import Member, Outcome, run_members
 
 if TYPE_CHECKING:
     from .case import Case

@@ -22,7 +22,7 @@ from .grid import Grid
 from .vectors import NOT_NEGATIVE
 
 if TYPE_CHECKING:
-    from .immersed import Nodes
+    from .immersed_boundary import Nodes
 
 _COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SIX = (0,) * 6

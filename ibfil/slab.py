@@ -19,7 +19,7 @@ from .pruned import run_of_cells
 from .transforms import modes_of, useful_threads
 
 if TYPE_CHECKING:
-    from .immersed import Nodes
+    from .immersed_boundary import Nodes
 
 _CACHE = 2**19  # bytes of a block
 _KEPT = 4  # sizes of slabs whose plans are kept, as rods move to and fro

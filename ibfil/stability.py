@@ -27,8 +27,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import CaseError
-from .members import Member, Outcome, run_members
 from .study import Axis, Setting, combinations, measured, study_members, write_csv, write_json
+from .study_members import Member, Outcome, run_members
 
 if TYPE_CHECKING:
     from .record import RunFile
@@ -169,7 +169,7 @@ def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str
 
 def compared(run: RunFile, best: RunFile) -> dict[str, float]:
     """The numbers that class a run, the largest over the outputs and filaments."""
-    from .distance import arclength, common_outputs, rms, rms_of_shape
+    from .study_distance import arclength, common_outputs, rms, rms_of_shape
 
     mine, theirs = common_outputs(run, best)
     shape, turn = rms_of_shape(run, best)

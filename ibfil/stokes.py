@@ -18,7 +18,7 @@ from . import averaged, krylov, mobility
 from .condensation import Reduced, RodStiffness
 from .fluid import Memoryless
 from .grid import Grid, interpolate, project, spread
-from .immersed import Immersed, ImmersedResponse, Nodes
+from .immersed_boundary import Immersed, ImmersedResponse, Nodes
 from .transforms import VectorTransform
 
 _EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself

@@ -1,6 +1,6 @@
 """What the studies have in common: the settings they vary, the numbers of a run, tables, and who measured them.
 
-A study is a list of members (members.py), each a setting of one case. `sweep`, `compare`, `trade` and
+A study is a list of members (study_members.py), each a setting of one case. `sweep`, `compare`, `trade` and
 `stability` are made of it, and so are scripts of users:
 
     settings = combinations([axis("time.step=0.01,0.02"), axis("fluid.cells=[32,32,32],[64,64,64]")])
@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import CaseError
-from .members import Member
+from .study_members import Member
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import CaseError
-from .members import Outcome, run_members, work
 from .study import Axis, Setting, combinations, measured, numbers, study_members, write_csv, write_json
+from .study_members import Outcome, run_members, work
 
 TABLE, TOLD = "sweep.csv", "sweep.json"
 

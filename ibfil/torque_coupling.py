@@ -41,7 +41,7 @@ from .mobility import point_response, sum_pair
 from .transforms import VectorTransform
 
 if TYPE_CHECKING:
-    from .immersed import Nodes
+    from .immersed_boundary import Nodes
 
 _FIFTEEN = (0,) * 15  # G xx .. yz, R x y z, W xx .. yz
 

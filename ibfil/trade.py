@@ -1,11 +1,11 @@
 """Error against wall time over settings of a case: `ibfil trade`.
 
-Every setting is run several times, in rounds, and held against a reference that has proved itself (reference.py). Its
-cost is seconds a unit of simulated time, without compilation, start-up and first step: the least of its runs, their
-range the noise. Seconds are those of the clock on the wall, or of the processor: the same on a machine that is idle
-(a run has one thread), and on a busy one the only ones that mean something. Its errors are those of the measures:
-`position`, the root mean square distance of nodes in units of L, and observables, relative. A setting is on the Pareto
-front of a measure where no other is both cheaper and better.
+Every setting is run several times, in rounds, and held against a reference that has proved itself
+(trade_reference.py). Its cost is seconds a unit of simulated time, without compilation, start-up and first step: the
+least of its runs, their range the noise. Seconds are those of the clock on the wall, or of the processor: the same on
+a machine that is idle (a run has one thread), and on a busy one the only ones that mean something. Its errors are
+those of the measures: `position`, the root mean square distance of nodes in units of L, and observables, relative. A
+setting is on the Pareto front of a measure where no other is both cheaper and better.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import CaseError, Interrupted, RunFailed
-from .members import Member, Outcome, run_members
-from .reference import POSITION, Reference, distances, prove
 from .study import Axis, Setting, combinations, measured, source, study_members, write_csv, write_json
+from .study_members import Member, Outcome, run_members
+from .trade_reference import POSITION, Reference, distances, prove
 
 if TYPE_CHECKING:
     from .case import Case

@@ -11,8 +11,8 @@ import pytest
 from ibfil import cli
 from ibfil.case import parse_case
 from ibfil.compare import choose_window, compare, fluid_overrides, known_fluids
+from ibfil.compare_quantities import Window, quantities, quantity
 from ibfil.errors import CaseError, RunFailed
-from ibfil.quantities import Window, quantities, quantity
 
 SWIMMER = """
 title = "A small swimmer"

@@ -86,7 +86,7 @@ def test_a_background_flow_is_added_to_velocity_and_vorticity(pushed):
 def test_probes_see_what_a_node_there_would_feel(pushed):
     """The table's velocity at a probe is the field interpolated with the same kernel."""
     from ibfil.grid import interpolate
-    from ibfil.immersed import Immersed
+    from ibfil.immersed_boundary import Immersed
     from ibfil.stokes import StokesByTable
 
     grid, r, force, stencil = pushed

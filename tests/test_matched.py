@@ -11,14 +11,14 @@ import platformdirs
 import pytest
 from scenes import scene
 
-from ibfil import assemble, assemble_fluid, matched
+from ibfil import assemble, assemble_fluid, matched_drag
 from ibfil.case import idle_keys
 from ibfil.check import report
 from ibfil.errors import CaseError
 from ibfil.grid import Grid
 from ibfil.groups import groups, warnings
 from ibfil.kernels import KERNELS
-from ibfil.matched import Match, Rod, directions, measure, places
+from ibfil.matched_drag import Match, Rod, directions, measure, places
 from ibfil.simulation import Simulation
 
 SMALL = Rod(0.5, 11, (1.6, 1.6, 1.6), (32, 32, 32), "peskin4", 0.01)
@@ -28,7 +28,7 @@ SMALL = Rod(0.5, 11, (1.6, 1.6, 1.6), (32, 32, 32), "peskin4", 0.01)
 def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A cache folder of the test's own, and nothing remembered."""
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / name)
-    matched.match.cache_clear()
+    matched_drag.match.cache_clear()
     return tmp_path
 
 
@@ -52,10 +52,10 @@ def test_known_numbers(length, cells, perp, par):
 def test_one_rod_on_a_grid_line_of_the_known_drag():
     """numerics.md, section 6."""
     grid, kernel = Grid([3.2] * 3, [64] * 3), KERNELS["peskin4"]
-    table = matched.mobility.octant(matched.mobility.point_response(grid, 1.0), kernel.points)
+    table = matched_drag.mobility.octant(matched_drag.mobility.point_response(grid, 1.0), kernel.points)
     line = np.linspace(-0.5, 0.5, 21)[:, None] * np.array([1.0, 0, 0])
-    drag = matched._drag(
-        matched.mobility.mobility(table, grid.cells, *kernel.stencil(grid.coordinates(line)), np.zeros(21))
+    drag = matched_drag._drag(
+        matched_drag.mobility.mobility(table, grid.cells, *kernel.stencil(grid.coordinates(line)), np.zeros(21))
     )
     assert np.diag(drag) == pytest.approx([3.866703, 5.760179, 5.760179], rel=1e-6)
     assert drag == pytest.approx(np.diag(np.diag(drag)), abs=1e-8)
@@ -70,14 +70,15 @@ def test_only_ratios_of_lengths_count():
 def test_scatter_is_what_places_and_directions_differ_by():
     """The mean and the deviation again, rod by rod, through forces that give the nodes one velocity."""
     grid, kernel = Grid(SMALL.box, SMALL.cells), KERNELS[SMALL.kernel]
-    table = matched.mobility.octant(matched.mobility.point_response(grid, 1.0), kernel.points)
+    table = matched_drag.mobility.octant(matched_drag.mobility.point_response(grid, 1.0), kernel.points)
     ds = SMALL.length / (SMALL.nodes - 1)
     slip = SMALL.slip * (grid.spacing / (2 * ds)) / (6 * np.pi * kernel.point_radius * grid.spacing)
     along, across, weights = [], [], []
     for weight, (t, n, b) in directions():
         for place in places(8):
             r = np.linspace(-0.25, 0.25, 11)[:, None] * t + place * grid.spacing
-            m = matched.mobility.mobility(table, grid.cells, *kernel.stencil(grid.coordinates(r)), np.full(11, slip))
+            stencil = kernel.stencil(grid.coordinates(r))
+            m = matched_drag.mobility.mobility(table, grid.cells, *stencil, np.full(11, slip))
             m = m.reshape(33, 33)
             along.append(np.tile(t, 11) @ np.linalg.solve(m, np.tile(t, 11)) / 0.5)
             across += [np.tile(u, 11) @ np.linalg.solve(m, np.tile(u, 11)) / 0.5 for u in (n, b)]
@@ -138,15 +139,15 @@ def never(rod: Rod) -> Match:
 
 def again(rod: Rod) -> Match:
     """As a new process would ask."""
-    matched.match.cache_clear()
-    return matched.match(rod)
+    matched_drag.match.cache_clear()
+    return matched_drag.match(rod)
 
 
 def test_what_was_measured_is_not_measured_again(monkeypatch, cache):
-    found = matched.match(SMALL)
+    found = matched_drag.match(SMALL)
     (kept,) = cache.rglob("*.json")
-    assert kept == matched.cache_file(SMALL)
-    monkeypatch.setattr(matched, "measure", never)
+    assert kept == matched_drag.cache_file(SMALL)
+    monkeypatch.setattr(matched_drag, "measure", never)
     assert again(SMALL) == found
     for change in ({"length": 0.4}, {"nodes": 12}, {"box": (1.6, 1.6, 3.2)}, {"kernel": "es5"}, {"slip": 0.02}):
         with pytest.raises(AssertionError, match="measured"):
@@ -168,8 +169,8 @@ def test_what_was_measured_is_not_measured_again(monkeypatch, cache):
     ],
 )
 def test_a_damaged_file_is_measured_again_and_put_right(text, cache):
-    found = matched.match(SMALL)
-    path = matched.cache_file(SMALL)
+    found = matched_drag.match(SMALL)
+    path = matched_drag.cache_file(SMALL)
     whole = path.read_text()
     if text.startswith("WHOLE -> "):
         text = whole.replace(str(json.loads(whole)["drag"]["par"]), text.removeprefix("WHOLE -> "))
@@ -180,7 +181,7 @@ def test_a_damaged_file_is_measured_again_and_put_right(text, cache):
 
 def test_a_folder_that_cannot_be_written_is_no_fault(cache):
     (cache / "ibfil").write_text("a file where the folder should be")
-    assert matched.match(SMALL) == measure(SMALL)
+    assert matched_drag.match(SMALL) == measure(SMALL)
 
 
 # --- in a case ------------------------------------------------------------------------------------------------------
@@ -237,18 +238,18 @@ def test_check_and_banner_tell_the_match():
 
 
 def test_a_drag_that_is_no_number_is_warned_of(monkeypatch):
-    monkeypatch.setattr(matched, "measure", lambda rod: Match(6.0, 4.0, 0.001, 0.03))
+    monkeypatch.setattr(matched_drag, "measure", lambda rod: Match(6.0, 4.0, 0.001, 0.03))
     assert any("differs by 0.03" in line for line in warnings(Simulation(case())))
-    matched.match.cache_clear()
-    for path in matched.cache_file(SMALL).parent.glob("*.json"):
+    matched_drag.match.cache_clear()
+    for path in matched_drag.cache_file(SMALL).parent.glob("*.json"):
         path.unlink()
-    monkeypatch.setattr(matched, "measure", lambda rod: Match(6.0, 4.0, 0.001, 0.003))
+    monkeypatch.setattr(matched_drag, "measure", lambda rod: Match(6.0, 4.0, 0.001, 0.003))
     assert not any("differs by" in line for line in warnings(Simulation(case())))
 
 
 def test_on_the_grid_itself_nothing_is_matched(monkeypatch):
     """Grid fluids take of the drag its spin alone."""
-    monkeypatch.setattr(matched, "measure", never)
+    monkeypatch.setattr(matched_drag, "measure", never)
     made = case(model="stokes", rods={"rod": {**ROD, "twisting": 1.0, "radius": 0.02}})
     assert assemble_fluid.matching(made, made.filaments["rod"]) is None
     Simulation(made)

@@ -16,11 +16,11 @@ import pytest
 from made_run import BENT
 from runs import content, wait_for
 
-from ibfil import members as module
+from ibfil import study_members as module
 from ibfil.errors import CaseError, Interrupted
-from ibfil.members import Member, Outcome, run_members, work
 from ibfil.record import RunFile, checkpoint_path
 from ibfil.running import run
+from ibfil.study_members import Member, Outcome, run_members, work
 
 ROOT = Path(__file__).parent.parent
 GOOD = Member("good", BENT)
@@ -136,7 +136,7 @@ import sys, time
 sys.path[:0] = {[str(ROOT), str(ROOT / "tests")]!r}
 from ibfil import loop
 from ibfil.errors import Interrupted
-from ibfil.members import Member, run_members
+from ibfil.study_members import Member, run_members
 from made_run import BENT
 class Waiting(loop.Loop):  # here and in each worker, which reads this script: a run waits in a step for the signal
     def _after_step(self):

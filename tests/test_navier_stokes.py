@@ -14,7 +14,7 @@ from ibfil.errors import RunFailed
 from ibfil.fields import GridFields
 from ibfil.fluid import Held
 from ibfil.grid import Grid, interpolate
-from ibfil.immersed import Immersed, Nodes
+from ibfil.immersed_boundary import Immersed, Nodes
 from ibfil.inertial_fields import InertialFields
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import Background, NavierStokes, Room

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import trapezoid
 
 from ibfil.case import read_case
-from ibfil.members import Member, Outcome, run_members
 from ibfil.shipped import named
+from ibfil.study_members import Member, Outcome, run_members
 from postprocess.paper import __main__ as paper
 from postprocess.paper import finite_difference, lagged_tension, stagnation
 from postprocess.paper.buckled import first_below, free_modes

@@ -11,7 +11,7 @@ from ibfil import mobility, torque_coupling
 from ibfil.fields import GridFields
 from ibfil.fluid import Held
 from ibfil.grid import Grid, interpolate, spread
-from ibfil.immersed import Immersed
+from ibfil.immersed_boundary import Immersed
 from ibfil.kernels import KERNELS
 from ibfil.stokes import StokesByFFT, StokesByTable, StokesSolve
 from ibfil.torque_coupling import StirredSolve, TorqueCoupling

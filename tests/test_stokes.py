@@ -9,7 +9,7 @@ from scipy.special import erfc
 from ibfil import krylov
 from ibfil.fluid import Held
 from ibfil.grid import Grid
-from ibfil.immersed import Immersed, slip_mobility
+from ibfil.immersed_boundary import Immersed, slip_mobility
 from ibfil.kernels import KERNELS, Kernel
 from ibfil.stokes import StokesByFFT, StokesByTable, StokesSolve
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from made_run import BENT
 
-from ibfil import cli, reference, trade_figure
-from ibfil.distance import superpose
+from ibfil import cli, trade_figure, trade_reference
 from ibfil.errors import CaseError, Interrupted, RunFailed
-from ibfil.members import run_members
 from ibfil.record import RunFile
 from ibfil.study import axis
+from ibfil.study_distance import superpose
+from ibfil.study_members import run_members
 from ibfil.trade import front, trade
 
 WAVE = BENT.replace('kind = "circle", curvature = 1.0', 'kind = "relaxed"').replace(
@@ -37,7 +37,7 @@ def runner(members, folder):
 def proved(tmp_path_factory):
     """The reference of a rod that bends itself, nodes varied."""
     folder = tmp_path_factory.mktemp("proved")
-    return reference.prove(
+    return trade_reference.prove(
         WAVE, ("time.end=1", "time.step=0.02", "output.every=0.2"), folder, ("position", "span"), True, runner
     )
 
@@ -60,9 +60,9 @@ def test_its_own_estimate_is_that_of_a_run_much_finer(proved, tmp_path):
     It takes errors to fall by four a level; how far they fell by another factor is how far it may be off.
     """
     overrides = ("time.end=1", "time.step=5e-3", "output.every=0.2", "filament.rod.nodes=129")
-    (outcome,) = runner([reference.Member("finer", WAVE, overrides)], tmp_path)
+    (outcome,) = runner([trade_reference.Member("finer", WAVE, overrides)], tmp_path)
     with RunFile(proved.path) as ours, RunFile(outcome.path) as finer:
-        left = reference.distances(ours, finer)
+        left = trade_reference.distances(ours, finer)
     for name in ("position", "span"):
         proof = proved.proofs[name][1]
         assert proof.estimate == pytest.approx(left[name] * 16 / 15, rel=abs(2**proof.order - 4) / 3)
@@ -72,11 +72,11 @@ def test_a_reference_without_its_order_is_refused(tmp_path, monkeypatch):
     """Distances that fall by 1.9 a level are order 0.93, less than 0.7 of two; by 3, order 1.6, enough."""
     for ratio, refused in ((1.9, ("position",)), (3.0, ())):
         falls = iter(ratio ** -np.arange(100.0))
-        monkeypatch.setattr(reference, "distances", lambda a, b, falls=falls: {"position": next(falls)})
-        found = reference.prove(BENT, (), tmp_path, ("position",), False, runner)
+        monkeypatch.setattr(trade_reference, "distances", lambda a, b, falls=falls: {"position": next(falls)})
+        found = trade_reference.prove(BENT, (), tmp_path, ("position",), False, runner)
         assert found.refused == refused
         assert found.proofs["position"][0].order == pytest.approx(np.log2(ratio))
-    monkeypatch.setattr(reference, "distances", lambda a, b: {"position": 1.0})
+    monkeypatch.setattr(trade_reference, "distances", lambda a, b: {"position": 1.0})
     with pytest.raises(RunFailed, match="shows its order in none"):
         trade(BENT, [axis("time.step=1e-3")], tmp_path, observe=["position"], say=quiet)
 

@@ -17,7 +17,7 @@ import pytest
 
 from ibfil.fluid import Held
 from ibfil.grid import Grid
-from ibfil.immersed import Immersed
+from ibfil.immersed_boundary import Immersed
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import NavierStokes, Room
 from ibfil.stokes import StokesByTable

@@ -14,8 +14,8 @@ from pathlib import Path
 import matplotlib
 
 from ibfil.errors import CaseError, Interrupted
-from ibfil.members import Member, run_members
 from ibfil.recorder import versions
+from ibfil.study_members import Member, run_members
 
 from .drawing import STYLE
 from .results import HEADINGS, Row, Runs, columns, markdown, plain

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ibfil import time_series
-from ibfil.members import Member
+from ibfil.study_members import Member
 
 from . import fig7_panels as panels
 from .buckled import bending_mode, first_below, fold

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ibfil.members import Outcome
 from ibfil.record import RunFile
+from ibfil.study_members import Outcome
 
 
 @dataclass(frozen=True)

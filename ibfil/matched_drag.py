@@ -36,7 +36,7 @@ from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
 from . import __version__, mobility, torque_coupling
 from .grid import Grid
-from .immersed import slip_mobility
+from .immersed_boundary import slip_mobility
 from .kernels import KERNELS
 
 PLACES = 8  # of the rod within a cell, for each direction

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import CaseError, Interrupted, RunFailed
-from .workers import side_by_side, stop_if_cut
+from .study_workers import side_by_side, stop_if_cut
 
 if TYPE_CHECKING:
     from .case import Case

@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .distance import rms
 from .errors import CaseError, RunFailed
-from .members import Member, Outcome
 from .record import RunFile
 from .study import observed, source
+from .study_distance import rms
+from .study_members import Member, Outcome
 
 if TYPE_CHECKING:
     from .case import Case

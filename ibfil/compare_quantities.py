@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import time_series
-from .distance import arclength, common_outputs, rms, rms_of_shape
+from .study_distance import arclength, common_outputs, rms, rms_of_shape
 from .time_series import trapezoid_weights
 from .units import label
 

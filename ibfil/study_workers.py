@@ -20,7 +20,7 @@ from .errors import Interrupted
 from .threads import set_threads
 
 if TYPE_CHECKING:
-    from .members import Member, Outcome
+    from .study_members import Member, Outcome
 
 _LOOK = 0.2  # seconds between two looks at signals
 
@@ -45,7 +45,7 @@ class Worker:
 
     def ended(self, cut: bool) -> Outcome:
         """Return what it has sent; where it has died, that: interrupted if ``cut``, failed otherwise."""
-        from .members import Outcome
+        from .study_members import Outcome
 
         member, self.member = self.member, None
         assert member is not None
@@ -114,7 +114,7 @@ def _serve(pipe: Connection, folder: str) -> None:
     signal.signal(signal.SIGINT, lambda number, frame: _cut.append(number))
     os.setpgrp()
     set_threads(1)
-    from .members import work
+    from .study_members import work
 
     try:
         while True:
