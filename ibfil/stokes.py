@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from . import averaged, krylov, mobility
+from . import krylov, mobility, mobility_averaged
 from .condensation import Reduced, RodStiffness
 from .fluid import Memoryless
 from .grid import Grid, interpolate, project, spread
@@ -143,16 +143,16 @@ class StokesByTable(Tabulated):
 
 
 class StokesByAverage(Tabulated):
-    """The stated approximation of averaged.py: cheaper by the kernel's size, and blind to where nodes lie in a cell."""
+    """The approximation of mobility_averaged.py: cheaper by the kernel's size, blind to where nodes lie in a cell."""
 
     def __init__(self, fluid: Immersed) -> None:
         super().__init__(fluid)
-        self._averaged = averaged.table(mobility.point_response(fluid.grid, fluid.viscosity), fluid.kernel)
+        self._averaged = mobility_averaged.table(mobility.point_response(fluid.grid, fluid.viscosity), fluid.kernel)
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Dense:
         """The averaged mobility of nodes r (n, 3)."""
         fluid, n = self.fluid, len(r)
-        matrix = averaged.mobility(self._averaged, fluid.grid.cells, fluid.grid.coordinates(r), fluid.slip)
+        matrix = mobility_averaged.mobility(self._averaged, fluid.grid.cells, fluid.grid.coordinates(r), fluid.slip)
         return _Dense(fluid, matrix.reshape(3 * n, 3 * n), r, e3, time, tau)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import STOKES, swimmer
 
-from ibfil import averaged, mobility
+from ibfil import mobility, mobility_averaged
 from ibfil.grid import Grid
 from ibfil.kernels import KERNELS
 from ibfil.simulation import Simulation
@@ -18,8 +18,8 @@ def _exact(kernel, r, number=np.float64):
 
 
 def _average(kernel, r):
-    table = averaged.table(mobility.point_response(GRID, 1.0), kernel)
-    return averaged.mobility(table, GRID.cells, GRID.coordinates(r), np.zeros(len(r)))
+    table = mobility_averaged.table(mobility.point_response(GRID, 1.0), kernel)
+    return mobility_averaged.mobility(table, GRID.cells, GRID.coordinates(r), np.zeros(len(r)))
 
 
 STATED = {"peskin4": (3.6e-3, 1.0e-2), "roma3": (1.1e-2, 2.7e-2), "bkp6": (2.8e-4, 7e-4), "es6": (2.6e-4, 7e-4)}
@@ -34,12 +34,12 @@ def test_the_averaged_table_is_off_by_what_is_stated(name):
     """
     kernel, grid, none = KERNELS[name], Grid([3.2] * 3, [64] * 3), np.zeros(41)
     response = mobility.point_response(grid, 1.0)
-    exact, average = mobility.octant(response, kernel.points), averaged.table(response, kernel)
+    exact, average = mobility.octant(response, kernel.points), mobility_averaged.table(response, kernel)
     r = Simulation(swimmer()).shape.r
     places, errors = np.random.default_rng(0).uniform(0, grid.spacing, (8, 3)), []
     for x in r - r.mean(axis=0) + places[:, None]:
         one = mobility.mobility(exact, grid.cells, *kernel.stencil(grid.coordinates(x)), none)
-        two = averaged.mobility(average, grid.cells, grid.coordinates(x), none)
+        two = mobility_averaged.mobility(average, grid.cells, grid.coordinates(x), none)
         errors.append((np.linalg.norm(one - two) / np.linalg.norm(one), np.abs(one - two).max() / np.abs(one).max()))
     assert np.mean(errors, axis=0) == pytest.approx(STATED[name], rel=0.15)
 
