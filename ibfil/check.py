@@ -10,7 +10,8 @@ from . import assemble_grid
 from .budget import disk, flow_parts, memory, shares, terms
 from .case import idle_keys
 from .case_schema import Matched
-from .groups import groups, warnings
+from .dimensionless import groups
+from .scene_warnings import warnings
 from .simulation import Simulation
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """The ways in which a run fails: what was found, the limit, the likely cause, the key to change. Each in one place.
 
-The README lists these with what `ibfil check` warns of (groups.py) and what a case is refused for (case_checks.py).
+The README lists these with what `ibfil check` warns of (scene_warnings.py) and refusals of cases (case_checks.py).
 """
 
 from __future__ import annotations

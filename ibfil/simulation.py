@@ -95,14 +95,14 @@ class Simulation:
     @property
     def groups(self) -> dict[str, float]:
         """The dimensionless groups of the scene."""
-        from .groups import groups
+        from .dimensionless import groups
 
         return groups(self)
 
     @property
     def warnings(self) -> list[str]:
         """What should make the user look twice, one sentence each."""
-        from .groups import warnings
+        from .scene_warnings import warnings
 
         return warnings(self)
 

@@ -140,17 +140,18 @@ def _prepared(member: Member) -> tuple[Member | None, str]:
 
 def _predicted(simulation: Any) -> str:
     """The name of what the dimensionless groups say will happen."""
-    from .groups import FINE, NEAR, groups
+    from .dimensionless import groups
+    from .scene_warnings import ACCURATE_OMEGA_DT, LOCKING_SPACING
 
     case = simulation.case
     if case.time.scheme == "explicit":
         return "diverged" if simulation.step_length > simulation.explicit_limit() else ""
     found = groups(simulation)
     near = min((value for key, value in found.items() if key.endswith("ds/h")), default=np.inf)
-    if case.fluid.model != "rft" and case.fluid.slip == 0 and near < NEAR:
+    if case.fluid.model != "rft" and case.fluid.slip == 0 and near < LOCKING_SPACING:
         return "locked"
     fast = max((value for key, value in found.items() if key.endswith("omega dt")), default=0.0)
-    return "wrong" if fast > 1.01 * FINE else ""
+    return "wrong" if fast > 1.01 * ACCURATE_OMEGA_DT else ""
 
 
 def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str) -> Cell:

@@ -14,7 +14,7 @@ from contact_scenes import GRID, case, crossed, ran
 from ibfil.check import absent, modelled
 from ibfil.contact import Contact
 from ibfil.errors import CaseError
-from ibfil.groups import warnings
+from ibfil.scene_warnings import warnings
 from ibfil.simulation import Simulation
 
 ROOT = Path(__file__).parent.parent

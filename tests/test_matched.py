@@ -14,11 +14,12 @@ from scenes import scene
 from ibfil import assemble, assemble_fluid, matched_drag
 from ibfil.case import idle_keys
 from ibfil.check import report
+from ibfil.dimensionless import groups
 from ibfil.errors import CaseError
 from ibfil.grid import Grid
-from ibfil.groups import groups, warnings
 from ibfil.kernels import KERNELS
 from ibfil.matched_drag import Match, Rod, directions, measure, places
+from ibfil.scene_warnings import warnings
 from ibfil.simulation import Simulation
 
 SMALL = Rod(0.5, 11, (1.6, 1.6, 1.6), (32, 32, 32), "peskin4", 0.01)

@@ -13,7 +13,7 @@ import pytest
 
 import ibfil
 from ibfil.errors import CaseError, RunFailed
-from ibfil.groups import warnings
+from ibfil.scene_warnings import warnings
 from ibfil.simulation import Simulation
 
 ROD = """

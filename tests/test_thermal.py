@@ -11,7 +11,7 @@ from thermal_scenes import BENT, ROD, USUAL, blocks, scene, walk
 
 from ibfil import banded, rft
 from ibfil.case import parse_case
-from ibfil.groups import groups
+from ibfil.dimensionless import groups
 from ibfil.simulation import Simulation
 
 # --- the kicks ----------------------------------------------------------------------------------------------------

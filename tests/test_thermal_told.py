@@ -9,8 +9,9 @@ import pytest
 from thermal_scenes import ROD, scene
 
 from ibfil import check, timescales
+from ibfil.dimensionless import groups
 from ibfil.errors import CaseError
-from ibfil.groups import groups, warnings
+from ibfil.scene_warnings import warnings
 from ibfil.simulation import Simulation
 
 

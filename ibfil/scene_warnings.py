@@ -1,4 +1,4 @@
-"""The dimensionless groups of a scene, and what in it should make its user look twice."""
+"""What in a scene should make its user look twice: it runs, but may not mean what is thought."""
 
 from __future__ import annotations
 
@@ -6,88 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble_fluid, assemble_grid, shapes, timescales
+from . import assemble_fluid, assemble_grid, shapes
+from .dimensionless import of_filament
 
 if TYPE_CHECKING:
     from .case_schema import Case
     from .simulation import Simulation
 
-NEAR = 0.8  # ds/h below which a nearly inextensible rod locks without slip (numerics.md, 4.3)
-FAR = 2.5  # ds/h beyond which the drag of a straight rod changes with it: within 1 % up to here, 5 % off at 4
-THICK = 0.2  # a/L above which a rod is shorter than 2.5 of its own diameters
+LOCKING_SPACING = 0.8  # ds/h below which a nearly inextensible rod locks without slip (numerics.md, 4.3)
+BEADS_SPACING = 2.5  # ds/h beyond which the drag of a straight rod changes with it: within 1 % up to here, 5 % off at 4
+SLENDER_RADIUS = 0.2  # a/L above which a rod is shorter than 2.5 of its own diameters
 CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the motion
-FULL = 0.98  # of the grid's twist radius, above which a rod's own spin does not keep its torques from locking
-UNEVEN = 0.02  # scatter of a straight rod's drag over places and directions, above which it is no number
-PERIODIC = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
-FINE = 0.3  # omega dt up to which the default scheme was measured to be accurate
-SOFT = 0.05  # mean square of a strain's thermal fluctuation (of stretch; of an angle between nodes): beyond, not small
-LONG = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
-
-
-def _rod(simulation: Simulation, filament) -> dict[str, float]:
-    """Groups of one filament."""
-    case, grid = simulation.case, simulation.grid
-    bending, length = timescales.softest(filament), filament.length
-    out: dict[str, float] = {}
-    rate = max(simulation.driving_rates(), default=0.0)
-    if rate:
-        out["sperm number"] = length * (simulation.drag(filament) * rate / bending) ** 0.25
-        if case.fluid.model == "navier-stokes":
-            assert case.fluid.density is not None
-            out["Re = rho omega L^2/eta"] = case.fluid.density * rate * length**2 / case.fluid.viscosity
-    if simulation.cycles:
-        out["omega dt"] = max(simulation.cycles) * simulation.step_length
-    stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
-    out["EA L^2/A"] = stretching * length**2 / bending
-    if case.thermal is not None and case.thermal.energy > 0:
-        out["A/(kT L)"] = bending / (case.thermal.energy * length)
-    if grid is not None:
-        from .kernels import KERNELS
-
-        out["ds/h"] = length / (filament.nodes - 1) / grid.spacing
-        out["a/L"] = KERNELS[case.fluid.kernel].line_radius * grid.spacing / length
-        if filament.twisting is not None and case.fluid.rotation == "grid":
-            out["a/L when spun"] = _spun(filament, assemble_grid.twist_radius(case)) / length
-        wave = _wave(filament)
-        if wave:
-            out["wavelength/h"] = 2 * np.pi / wave / grid.spacing
-    elif filament.radius is not None:
-        out["a/L"] = float(np.max(filament.radius.bind("s", "t")(0.5 * length, 0.0))) / length
-    matched = assemble_fluid.matching(case, filament)
-    if matched is not None:
-        out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
-        out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
-        if matched.spin:
-            out["matched zeta_r/eta"] = matched.spin
-    return out
-
-
-def _spun(filament, widest: float) -> float:
-    """The radius a filament spins as on a grid whose twist radius is ``widest``: no more than that."""
-    if filament.radius is None:
-        return widest
-    return min(widest, float(np.max(filament.radius.bind("s", "t")(0.5 * filament.length, 0.0))))
-
-
-def _wave(filament) -> float:
-    """Largest wave number of the preferred curvatures at t = 0; zero where they are constant."""
-    s = np.array([0.0, filament.length])
-    waves = [0.0]
-    for curvature in filament.curvature:
-        if "s" in curvature.variables:
-            value = curvature.bind("s", "t")
-            waves.append(timescales.wave_number(lambda x, v=value: v(x, 0.0), s))  # type: ignore[misc]
-    return max(waves)
-
-
-def groups(simulation: Simulation) -> dict[str, float]:
-    """The dimensionless groups of the scene; with several filaments each name begins with the filament's."""
-    filaments = simulation.case.filaments
-    out: dict[str, float] = {}
-    for name, filament in filaments.items():
-        prefix = "" if len(filaments) == 1 else f"{name}: "
-        out.update({prefix + key: value for key, value in _rod(simulation, filament).items()})
-    return out
+TWIST_RADIUS_SHARE = 0.98  # of the grid's: above, a rod's own spin does not keep its torques from locking
+DRAG_SCATTER = 0.02  # scatter of a straight rod's drag over places and directions, above which it is no number
+FLOW_JUMP = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
+ACCURATE_OMEGA_DT = 0.3  # omega dt up to which the default scheme was measured to be accurate
+FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
+THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
 
 
 def warnings(simulation: Simulation) -> list[str]:
@@ -95,13 +30,14 @@ def warnings(simulation: Simulation) -> list[str]:
     case, out = simulation.case, []
     for name, filament in case.filaments.items():
         key = f"filament.{name}"
-        found = _rod(simulation, filament)
+        found = of_filament(simulation, filament)
         out += _of_grid(key, found, case)
         out += _of_spin(simulation, key, filament)
         out += _of_images(simulation, key, name)
-        if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * FINE:
-            out.append(f"time.step: omega dt = {found['omega dt']:.3g}; the schemes are accurate up to about {FINE}")
-        if found.get("matched scatter", 0.0) > UNEVEN:
+        if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * ACCURATE_OMEGA_DT:
+            found_dt = f"omega dt = {found['omega dt']:.3g}"
+            out.append(f"time.step: {found_dt}; the schemes are accurate up to about {ACCURATE_OMEGA_DT}")
+        if found.get("matched scatter", 0.0) > DRAG_SCATTER:
             out.append(
                 f"{key}: the drag of a straight rod differs by {found['matched scatter']:.2g} of itself between places "
                 "in a cell and directions: set fluid.slip = 0.01, or take a wider fluid.kernel or a larger fluid.box"
@@ -119,21 +55,21 @@ def warnings(simulation: Simulation) -> list[str]:
 def _of_grid(key: str, found: dict[str, float], case: Case) -> list[str]:
     """Nodes too near or too far for the grid, and rods and waves too small for it."""
     out, apart, thick = [], found.get("ds/h", 1.0), found.get("a/L", 0.0)
-    if apart < NEAR and case.fluid.slip == 0:
+    if apart < LOCKING_SPACING and case.fluid.slip == 0:
         out.append(
-            f"{key}: nodes are {apart:.2g} cells apart and fluid.slip = 0: below {NEAR} a nearly "
+            f"{key}: nodes are {apart:.2g} cells apart and fluid.slip = 0: below {LOCKING_SPACING} a nearly "
             "inextensible rod locks, and moves wrongly without any sign of trouble; "
             "set fluid.slip = 0.01, or take fewer nodes or more cells"
         )
-    if apart > FAR:
+    if apart > BEADS_SPACING:
         out.append(
-            f"{key}: nodes are {apart:.2g} cells apart: beyond {FAR} it is a row of beads, and fluid passes between "
-            "(at 4 cells with 5 % less drag across); take more nodes, or fewer fluid.cells"
+            f"{key}: nodes are {apart:.2g} cells apart: beyond {BEADS_SPACING} it is a row of beads, and fluid passes "
+            "between (at 4 cells with 5 % less drag across); take more nodes, or fewer fluid.cells"
         )
-    if case.fluid.model != "rft" and thick > THICK:
+    if case.fluid.model != "rft" and thick > SLENDER_RADIUS:
         out.append(
-            f"{key}: a/L = {thick:.2g}: on this grid it is less than {0.5 / THICK:g} times as long as it is thick, "
-            "no slender rod; take more fluid.cells"
+            f"{key}: a/L = {thick:.2g}: on this grid it is less than {0.5 / SLENDER_RADIUS:g} times as long as it "
+            "is thick, no slender rod; take more fluid.cells"
         )
     if found.get("wavelength/h", np.inf) < CELLS_A_WAVE:
         out.append(
@@ -166,7 +102,7 @@ def _of_spin(simulation: Simulation, key: str, filament) -> list[str]:
     widest = assemble_grid.twist_radius(case)
     largest = float(np.max(filament.radius.bind("s", "t")(np.linspace(0.0, filament.length, 11), 0.0)))
     out = []
-    if case.fluid.slip == 0 and largest > FULL * widest:
+    if case.fluid.slip == 0 and largest > TWIST_RADIUS_SHARE * widest:
         out.append(
             f"{key}: fluid.slip = 0, and the rod is as thick as the grid makes it spin: torques that change sign from "
             "node to node lock it; set fluid.slip = 0.01, or take a smaller radius"
@@ -205,7 +141,7 @@ def _softness(key: str, filament, energy: float) -> list[str]:
         return energy * size / float(np.min(modulus.bind("s", "t")(s, 0.0)))
 
     stretched = square(filament.stretching, 1 / ds)
-    if stretched > SOFT:
+    if stretched > FLUCTUATION:
         out.append(
             f"{key}.stretching: segments fluctuate by {np.sqrt(stretched):.2g} of their length (rms): "
             "take a larger one, or fewer nodes"
@@ -214,7 +150,7 @@ def _softness(key: str, filament, energy: float) -> list[str]:
     if filament.twisting is not None:
         turned["twisting"] = square(filament.twisting, ds)
     for kind, value in turned.items():
-        if value > SOFT:
+        if value > FLUCTUATION:
             out.append(
                 f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: more nodes"
             )
@@ -226,7 +162,7 @@ def _of_noisy_step(simulation: Simulation) -> list[str]:
     out: list[str] = []
     assert case.thermal is not None
     stretch = simulation.thermal_stretch(dt)
-    if stretch > LONG:
+    if stretch > THERMAL_STRETCH:
         out.append(
             f"time.step: thermal kicks turn segments so far in a step that they stay {100 * stretch:.2g} % longer; "
             "take a shorter one"
@@ -280,7 +216,7 @@ def _of_flow(simulation: Simulation) -> list[str]:
     here = flow(places, simulation.time)
     jump = max(float(np.max(np.abs(flow(places + side, simulation.time) - here))) for side in np.diag(grid.box))
     largest = max(float(np.max(np.abs(here))), 1e-300)
-    if jump <= PERIODIC * largest:
+    if jump <= FLOW_JUMP * largest:
         return []
     return [
         f"fluid.flow: not periodic: it changes by {jump:.3g} from a face of the box to the one opposite (0 if it "
