@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def elastic_energy(run: RunFile, name: str) -> np.ndarray | None:
-    """1/2 int (M1^2/A1 + M2^2/A2 + M3^2/C + T^2/EA) ds over the run (T,); None where the law is not linear (Eq. 4).
+    """1/2 int (M1^2/A1 + M2^2/A2 + M3^2/C + T^2/EA) ds over the run (T,); None where the law is not linear (Eq. 9).
 
     The trapezoid rule over nodes for moments, segment by segment for tension; a free end has no moment and so no share.
     """

@@ -1,6 +1,6 @@
 """From nodes and frames to tangents, strains and spacing: everything the forces are made of.
 
-r' and r'' by the stencils of mesh.py (Eq. 15), e3 = r'/|r'|, e2 = e3 x e1, O1 = -e2.r'', O2 = e1.r'', O3 by Eq. 39.
+r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 = -e2.r'', O2 = e1.r'', O3 by Eq. 39.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Geometry:
 
 @njit(cache=True, inline="always")
 def _derivatives(mesh, g, i):
-    """r' and r'' at node i, from the positions in the table, through the stencils (Eq. 15)."""
+    """r' and r'' at node i, from the positions in the table, through the stencils."""
     d1, d2 = at(mesh.c1, i, 0), at(mesh.c2, i, 0)
     first = mesh.first[i] & NOT_NEGATIVE
     for k in range(mesh.w1.shape[1]):

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from made_run import BENT
 
+import ibfil
+
 ROOT = Path(__file__).parent.parent
 MODULES = {path.stem: path for path in (ROOT / "ibfil").glob("*.py")}
 
@@ -50,6 +52,14 @@ def imports(name: str, at_load: bool = False) -> set[str]:
 
 def test_every_module_this_file_speaks_of_is_there():
     assert CASE | FLUIDS | RODS | RESULTS | (LOOKING - {"bench"}) | {"stepping", "fluid"} <= set(MODULES)
+
+
+def test_the_map_in_the_package_names_every_module_once():
+    """The docstring of ibfil lists its modules by subject: one that is new has to find its place there."""
+    table = ibfil.__doc__.split("means one subject:")[1].split("Equations are numbered")[0]
+    lines = [line for line in table.splitlines() if line.strip()]
+    named = " ".join(line[18:] for line in lines).split()
+    assert sorted(named) == sorted(set(MODULES) - {"__init__", "__main__"})
 
 
 def test_a_stepper_knows_no_fluid_and_a_fluid_no_stepper():
