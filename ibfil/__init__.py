@@ -28,9 +28,10 @@ Modules by what they are about; a common first word means one subject:
     time          stepping marching timescales
     algebra       vectors blocks banded
     scene         case case_schema case_filament case_values case_checks case_checks_filament case_checks_planar
-                  case_checks_size case_faults case_listing case_overrides expressions shapes shape_curves
-                  shape_points shape_from_run shape_placing shape_copies assemble assemble_laws assemble_loads
-                  assemble_contact assemble_profiles assemble_fluid assemble_grid assemble_inertia costs
+                  case_checks_size case_faults case_listing case_overrides expressions separation shapes
+                  shape_curves shape_points shape_from_run shape_placing shape_copies assemble assemble_laws
+                  assemble_loads assemble_contact assemble_profiles assemble_fluid assemble_grid assemble_inertia
+                  costs
     running       simulation running loop schedule progress failures errors threads
     results       frames diagnostics record recorder journal checkpoint examine units observe observables
                   observables_fitted observables_place time_series stops expectations energy recorded_flow analysis

@@ -7,9 +7,10 @@ import pytest
 from test_navier_stokes import fluid
 
 from ibfil.assemble_inertia import flow_parts
+from ibfil.budget import memory
 from ibfil.case import read_case
+from ibfil.check import report
 from ibfil.expressions import parse
-from ibfil.report import memory, report
 from ibfil.separation import products
 from ibfil.simulation import Simulation
 
