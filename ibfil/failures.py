@@ -28,21 +28,26 @@ class Trouble(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What is known of the step: its length, the scheme's limit (infinite where it has none)."""
+    """What is known of the step: its length, the scheme's limit (infinite where it has none), thermal kicks."""
 
     dt: float
     limit: float
+    kicked: bool = False
 
     def cause(self, otherwise: str) -> str:
         """The likely cause: a step above the limit where there is one."""
         if self.dt > self.limit:
             return f"dt = {self.dt:.3g} is above the explicit scheme's limit, {self.limit:.3g} at the start shape"
+        if self.kicked:
+            return f"thermal kicks turn segments further within dt = {self.dt:.3g} than the linearised step follows"
         return otherwise
 
     def cure(self, otherwise: str) -> str:
         """What to change then."""
         if self.dt > self.limit:
             return f"time.step below {self.limit:.3g}, or time.scheme=implicit"
+        if self.kicked:
+            return "larger moduli where the warnings ask for them; a tenth of time.step; fewer nodes, each less kicked"
         return otherwise
 
 

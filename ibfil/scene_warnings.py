@@ -22,6 +22,7 @@ DRAG_SCATTER = 0.02  # scatter of a straight rod's drag over places and directio
 FLOW_JUMP = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
 ACCURATE_OMEGA_DT = 0.3  # omega dt up to which the default scheme was measured to be accurate
 FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
+QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
 THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
 
 
@@ -151,8 +152,11 @@ def _softness(key: str, filament, energy: float) -> list[str]:
         turned["twisting"] = square(filament.twisting, ds)
     for kind, value in turned.items():
         if value > FLUCTUATION:
+            enough = 1 + int(np.ceil((filament.nodes - 1) * value / FLUCTUATION))
             out.append(
-                f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: more nodes"
+                f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: "
+                f"{value / FLUCTUATION:.2g} times that modulus, or {enough} nodes"
+                + ("; as it is, some are soon a quarter turn apart, which stops the run" if value > QUARTER_TURNS else "")
             )
     return out
 

@@ -264,7 +264,7 @@ class Simulation:
         """What is known of a step that failed; the limit is that of the start, where the present is not finite."""
         explicit = self.case.time.scheme == "explicit"
         limit = timescales.explicit_limit(self.mechanics, self.fluid, self._rods.start, 0.0) if explicit else np.inf
-        return failures.Step(dt, limit)
+        return failures.Step(dt, limit, self.case.thermal is not None and self.case.thermal.energy > 0)
 
     def _look_at_crossing(self, dt: float) -> None:
         """Tells, once, of a given step in which the fluid moves too far for its extrapolated advection."""

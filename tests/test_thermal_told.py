@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -10,7 +11,7 @@ from thermal_scenes import ROD, scene
 
 from ibfil import check, timescales
 from ibfil.dimensionless import groups
-from ibfil.errors import CaseError
+from ibfil.errors import CaseError, RunFailed
 from ibfil.scene_warnings import warnings
 from ibfil.simulation import Simulation
 
@@ -51,8 +52,8 @@ def test_check_says_what_is_kicked_and_how_stiff_the_rod_is_against_it():
     [
         ({"derivative": 6}, 1e-4, {}, r"filament\.rod\.derivative: .* order 6"),
         ({"stretching": 10.0}, 0.1, {}, r"filament\.rod\.stretching: .* of their length"),
-        ({"bending": [1.0, 0.1]}, 0.1, {}, r"filament\.rod\.bending: .* more nodes"),
-        ({"twisting": 0.1}, 0.1, {}, r"filament\.rod\.twisting: .* more nodes"),
+        ({"bending": [1.0, 0.1]}, 0.1, {}, r"filament\.rod\.bending: .* nodes"),
+        ({"twisting": 0.1}, 0.1, {}, r"filament\.rod\.twisting: .* nodes"),
         ({}, 0.1, {"time": {"step": 1e-3}}, r"time\.step: .* % longer"),
         ({"stretching": 1e6}, 1e-6, {"time": {"step": 5e-2}}, r"time\.step: .* thermal spread only in"),
         ({"direction": [0, 0, 1], "normal": [1, 0, 0]}, 1e-4, {"directions": "xy"}, r"thermal\.directions: .* plane"),
@@ -85,3 +86,18 @@ def test_the_stretch_that_kicks_leave_is_that_of_free_segments_while_steps_are_s
     mobility = 1 / (drag * 0.1 * np.array([0.5, *np.ones(9), 0.5]))
     expected = 0.25 * 2 * np.mean(2 * energy * dt * (mobility[1:] + mobility[:-1])) / 0.1**2
     assert timescales.thermal_stretch(energy, drag, 1.0, 1.0, nodes, dt) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_run_that_kicks_tear_says_so_and_not_that_something_pulls():
+    """A spread of twist beyond a quarter turn: told beforehand with what would be enough, and where it stops."""
+    case = scene({"rod": {**ROD, "twisting": 0.05}}, 0.1, time={"step": 1e-3, "end": 1.0})
+    simulation = Simulation(case)
+    (line,) = matching(warnings(simulation), r"filament\.rod\.twisting: ")
+    nodes, square = ROD["nodes"], 0.1 * (ROD["length"] / (ROD["nodes"] - 1)) / 0.05
+    assert f"{square / 0.05:.2g} times that modulus" in line
+    assert f" or {1 + math.ceil((nodes - 1) * square / 0.05)} nodes" in line
+    assert ("stops the run" in line) == (square > 0.2)
+    with pytest.raises(RunFailed) as stopped:
+        simulation.advance(1.0, lambda: None)
+    assert "thermal kicks" in stopped.value.cause
+    assert "a tenth of time.step" in stopped.value.advice
