@@ -342,6 +342,9 @@ def _vtk(arguments: argparse.Namespace) -> int:
     more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": _log}
     path = write_vtk(arguments.run, arguments.folder, **more)
     print(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
+    alone = path.with_stem(f"{path.stem}_filaments")
+    if alone.exists():
+        print(f"for filters of lines, such as Tube: {alone}, without the grid")
     return DONE
 
 

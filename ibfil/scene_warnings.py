@@ -156,7 +156,11 @@ def _softness(key: str, filament, energy: float) -> list[str]:
             out.append(
                 f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: "
                 f"{value / FLUCTUATION:.2g} times that modulus, or {enough} nodes"
-                + ("; as it is, some are soon a quarter turn apart, which stops the run" if value > QUARTER_TURNS else "")
+                + (
+                    "; as it is, some are soon a quarter turn apart, which stops the run"
+                    if value > QUARTER_TURNS
+                    else ""
+                )
             )
     return out
 

@@ -1,7 +1,7 @@
 """A run as ParaView files.
 
-One .pvd collection with the real times, a .vtp of all filaments for each output, a .vti for each grid field time, and
-a ready scene (vtk_scene.py).
+One .pvd collection with the real times, a .vtp of all filaments for each output, a .vti for each grid field time, where
+there are both a .pvd of either alone, and a ready scene (vtk_scene.py).
 
 Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
 file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
@@ -84,8 +84,14 @@ class Collection:
             self._add_filaments(run)
             self._add_fields(run)
             _write_collection(self.path, [self.filaments, self.fields])
+            if self.fields:  # each kind alone too: filters of lines, such as Tube, may crash ParaView upon a grid
+                _write_collection(self._alone("filaments"), [self.filaments])
+                _write_collection(self._alone("grid"), [self.fields])
             write_scene(self.path, run)
             return run.status == "running"
+
+    def _alone(self, kind: str) -> Path:
+        return self.path.with_stem(f"{self.path.stem}_{kind}")
 
     def _add_filaments(self, run: RunFile) -> None:
         """A .vtp for each output that is not there yet."""
