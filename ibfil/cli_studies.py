@@ -225,7 +225,10 @@ def _print_comparison(made: Any) -> None:
     lines += [[name, *(cell(column.numbers.get(name)) for column in made.columns)] for name in names]
     print("\n".join(table(lines)))
     window = made.window
-    print(f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}")
+    print(
+        f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}; "
+        "+- their standard error, from the scatter between these, not that of steps, nodes or cells"
+    )
     for column in made.columns:
         for line in column.own or (column.outcome.message or "nothing that the others do not model",):
             print(f"  {column.fluid}: {line}")
@@ -241,6 +244,10 @@ def _stability(arguments: argparse.Namespace) -> int:
 
     made = stability.stability(case, axes, folder, changes, jobs=arguments.jobs, say=_say)
     _print_table(stability.rows(made), ("message",))
+    print(
+        "against a finer run, the largest over outputs: place and shape (without rigid motion), rms of nodes/L; "
+        "turn, rad; stretch; force, ratio"
+    )
     print(f"{made.foretold} of {len(made.cells)} as predicted")
     print(f"{folder / stability.TABLE}, {stability.TOLD}, {stability.FIGURE}")
     return 0

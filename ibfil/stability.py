@@ -17,7 +17,6 @@ slip lock, and that omega dt beyond 0.3 is not accurate.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -84,12 +83,15 @@ def stability(
     folder, settings = Path(folder), combinations(axes)
     members = study_members(case, overrides, settings)
     finer, predictions = [], []
+    shared: dict[str, Member] = {}  # by the case: cells that differ in nothing it keeps have one, called as the first
     for member in members:
         reference, predicted = _prepared(member)
-        finer.append(reference)
+        finer.append(None if reference is None else shared.setdefault(reference.resolved().text, reference))
         predictions.append(predicted)
-    references = {one.name: one for one in finer if one is not None}
-    run_members(list(references.values()), folder / "finer", jobs=jobs, executor=executor, say=say)
+    references = list(shared.values())
+    run_members(
+        references, folder / "finer", jobs=jobs, executor=executor, say=lambda line: say(f"finer run of {line}")
+    )
     outcomes = run_members(members, folder / "runs", jobs=jobs, executor=executor, say=say)
     cells = tuple(
         _cell(setting, outcome, None if best is None else folder / "finer" / f"{best.name}.h5", predicted)
@@ -133,9 +135,7 @@ def _prepared(member: Member) -> tuple[Member | None, str]:
     overrides = (*member.overrides, *default, f"time.step={step!r}")
     if case.fluid.model != "rft":
         overrides += (f"fluid.slip={max(case.fluid.slip, SLIP)!r}",)
-    resolved = Member("finer", member.case, overrides).resolved().text
-    name = hashlib.sha256(resolved.encode()).hexdigest()[:12]  # cells that differ in nothing it keeps share it
-    return Member(name, member.case, overrides), _predicted(simulation)
+    return Member(member.name, member.case, overrides), _predicted(simulation)
 
 
 def _predicted(simulation: Any) -> str:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Colours that all eyes tell apart (Okabe and Ito, lightened), and a letter in each square for prints without them.
 _COLOURS = ("#d9f0e6", "#56B4E9", "#CC79A7", "#E69F00", "#f0e442", "#D55E00", "#bbbbbb")
 _LETTERS = ("", "W", "T", "L", "S", "D", "?")
-_WORDS = {"W": "wrong: > 0.05 L away", "T": "turned: > 0.1 rad", "L": "locked: forces > 10 times",
+_WORDS = {"W": "wrong: > 0.05 L away", "T": "turned: > 0.1 rad", "L": "locked: > 10 times the forces",
           "S": "stretched: > 0.02", "D": "diverged: failed", "?": "no reference", "": "stable"}  # fmt: skip
 
 

@@ -104,7 +104,9 @@ def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):
     assert told["limits"]["stretch"] == 0.02
     assert told["machine"]
     assert (here / "out/stability.png").read_bytes().startswith(b"\x89PNG")
-    assert len(list((here / "out/finer").glob("*.h5"))) == 2  # explicit steps share the finer run of their nodes
+    runs, finer = ({path.name for path in (here / "out" / of).glob("*.h5")} for of in ("runs", "finer"))
+    assert len(finer) == 2  # explicit steps share the finer run of their nodes
+    assert finer < runs  # and its name is that of the first
 
 
 def test_what_cannot_be_judged_is_refused_or_told(tmp_path):

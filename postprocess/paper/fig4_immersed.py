@@ -47,7 +47,7 @@ def draw(runs: Runs, quick: bool) -> tuple[Figure, list[Row]]:
         run = runs[f"fig4-{name}"]
         speed = _speed(run)
         mappable = _flow(axes, run)
-        axes_labels(axes, "x/L", "y/L", f"{words}: U = {speed:+.4f}")
+        axes_labels(axes, "x/L", "y/L", f"{words}\nU = {speed:+.4f}")
         note = (
             "the wrong way, and nothing but a warning says so"
             if name == "locked"
@@ -58,7 +58,7 @@ def draw(runs: Runs, quick: bool) -> tuple[Figure, list[Row]]:
                 "Fig. 4", f"speed along x, {words}", "", known, speed, run.wall_time, 0.01 if known else None, note=note
             )
         )
-    figure.colorbar(mappable, ax=axes, label="speed of the fluid (L per time)", shrink=0.8)
+    figure.colorbar(mappable, ax=axes, label="speed of the fluid (L per time)", shrink=0.8, extend="max")
     return figure, rows
 
 
