@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import time_series
-from .study_distance import arclength, common_outputs, rms, rms_of_shape
+from .study_distance import common_outputs, rms, rms_of_shape
 from .time_series import trapezoid_weights
 from .units import label
 
@@ -68,7 +68,7 @@ def quantities(run: RunFile, window: Window, first: RunFile | None = None) -> di
 def _of_filament(run: RunFile, name: str, window: Window) -> dict[str, Quantity]:
     """Swimming, reactions and frequency of one filament."""
     units = run.case.units
-    columns, s = run.filaments[name], arclength(run, name)
+    columns, s = run.filaments[name], run.arclength(name)
     position = np.asarray(columns["position"])
     centroid = np.einsum("n,tni->ti", trapezoid_weights(s) / (s[-1] - s[0]), position)
     at = [[time_series.at_time(run.time, centroid, t) for t in ends] for ends in window.each()]

@@ -170,13 +170,13 @@ def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str
 
 def compared(run: RunFile, best: RunFile) -> dict[str, float]:
     """The numbers that class a run, the largest over the outputs and filaments."""
-    from .study_distance import arclength, common_outputs, rms, rms_of_shape
+    from .study_distance import common_outputs, rms, rms_of_shape
 
     mine, theirs = common_outputs(run, best)
     shape, turn = rms_of_shape(run, best)
     stretch, forces = 0.0, []
     for name, columns in run.filaments.items():
-        rest = np.diff(arclength(run, name))
+        rest = np.diff(run.arclength(name))
         other = best.filaments[name]
         pair = (np.asarray(columns["position"])[mine], np.asarray(other["position"])[theirs])
         a, b = (np.linalg.norm(np.diff(r, axis=1), axis=2) / rest for r in pair)

@@ -35,25 +35,12 @@ def paths(a: RunFile, b: RunFile) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
     ia, ib = common_outputs(a, b)
     for name, columns in a.filaments.items():
-        length = description(a, name).length
+        length = a.filament(name).length
         there = np.asarray(b.filaments[name]["position"])[ib]
-        s, s_there = arclength(a, name), arclength(b, name)
+        s, s_there = a.arclength(name), b.arclength(name)
         if len(s) != len(s_there) or np.max(np.abs(s - s_there)) > 1e-12 * length:
             there = make_interp_spline(s_there, there, k=5, axis=1)(s)
         yield np.asarray(columns["position"])[ia] / length, there / length
-
-
-def description(run: RunFile, name: str):
-    """The case's table of a filament, or of the one it is a copy of."""
-    filaments = run.case.filaments
-    return filaments[name if name in filaments else name.rpartition("_")[0]]
-
-
-def arclength(run: RunFile, name: str) -> np.ndarray:
-    """Arclength (N,) at rest of a filament's nodes."""
-    from .shapes import node_arclength
-
-    return node_arclength(description(run, name))
 
 
 def rms(a: RunFile, b: RunFile) -> np.ndarray:
