@@ -24,7 +24,7 @@ Modules by what they are about; a common first word means one subject:
                   thermal mechanics
     fluids        fluid rft matched_drag immersed_boundary condensation stokes krylov pruned mobility
                   mobility_averaged torque_coupling navier_stokes past advection slab grid kernels transforms fields
-                  inertial_fields
+                  fields_inertia
     time          stepping marching timescales
     algebra       vectors blocks banded
     scene         case case_schema case_filament case_values case_checks case_checks_filament case_checks_planar

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from .case_filament import Filament
     from .case_schema import Case
     from .fields import GridFields
-    from .fluid import Fluid
+    from .fluid import Flow, Fluid
     from .grid import Grid
     from .matched_drag import Match
 
@@ -82,7 +81,7 @@ def drag(case: Case, stacked: Stacked) -> rft.Drag:
     return out
 
 
-def flow(case: Case) -> Callable[[np.ndarray, float], np.ndarray] | None:
+def flow(case: Case) -> Flow | None:
     """The background velocity (k, 3) at places r (k, 3) and a time; None where the case has none."""
     if case.fluid.flow is None:
         return None
@@ -142,7 +141,7 @@ def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Sol
 def fields(case: Case, fluid: Fluid, grid: Grid) -> GridFields:
     """What makes the fields of the fluid that the case has, for output."""
     from .fields import GridFields
-    from .inertial_fields import InertialFields
+    from .fields_inertia import InertialFields
     from .navier_stokes import NavierStokes
 
     if isinstance(fluid, NavierStokes):

@@ -6,15 +6,14 @@ The pressure is that of the rods' disturbance, without the uniform gradient that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from .fluid import Flow
 from .grid import Grid, interpolate, project, spread
 from .torque_coupling import curl, half_curl
 from .transforms import VectorTransform
-
-Flow = Callable[[np.ndarray, float], np.ndarray]
 
 
 class GridFields:

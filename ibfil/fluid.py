@@ -14,9 +14,12 @@ so held nodes are data, and the reaction on a support comes out of the solve.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
+
+Flow = Callable[[np.ndarray, float], np.ndarray]  # places (k, 3) and a time -> background velocity (k, 3)
 
 
 class Held(NamedTuple):

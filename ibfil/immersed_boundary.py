@@ -11,7 +11,6 @@ than the grid (numerics.md, 4.3). What of a node goes through the fluid is told 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -20,12 +19,10 @@ import numpy as np
 
 from . import banded
 from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
-from .fluid import Answer, Held
+from .fluid import Answer, Flow, Held
 from .grid import Grid
 from .kernels import Kernel
 from .mobility import TRANSLATION
-
-Flow = Callable[[np.ndarray, float], np.ndarray]
 
 
 class Coupling(Protocol):

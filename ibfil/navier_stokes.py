@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .advection import cross, cross_in, curl, filters
-from .fluid import Response
+from .fluid import Flow, Response
 from .grid import Grid, interpolate
-from .immersed_boundary import Flow, Immersed, ImmersedResponse, Nodes
+from .immersed_boundary import Immersed, ImmersedResponse, Nodes
 from .past import Past, Weights, weights
 from .slab import Block, Slab
 from .stokes import Tabulated

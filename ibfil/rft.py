@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from . import banded
-from .fluid import Answer, Held, Memoryless
+from .fluid import Answer, Flow, Held, Memoryless
 from .vectors import at, dot, mix, put
 
 
@@ -91,7 +91,9 @@ def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, prof
 class _Response:
     keeps = False
 
-    def __init__(self, drag: Drag, profile: banded.Profile, e3: np.ndarray, flow, tau: float) -> None:
+    def __init__(
+        self, drag: Drag, profile: banded.Profile, e3: np.ndarray, flow: np.ndarray | None, tau: float
+    ) -> None:
         self.drag, self.profile, self.e3, self.flow, self.tau = drag, profile, e3, flow, tau
 
     def _velocity_target(self, target: np.ndarray) -> np.ndarray:
@@ -155,7 +157,7 @@ class ResistiveForce(Memoryless):
     ``flow(r, t)`` the background velocity (n, 3) at the nodes, or None (Eq. 48).
     """
 
-    def __init__(self, drag: Drag, profile: banded.Profile, flow=None) -> None:
+    def __init__(self, drag: Drag, profile: banded.Profile, flow: Flow | None = None) -> None:
         self.drag, self.profile, self.flow = drag, profile, flow
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Response:

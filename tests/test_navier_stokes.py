@@ -12,10 +12,10 @@ from scenes import STOKES, rms, run, slopes, swimmer
 from ibfil.advection import filters
 from ibfil.errors import RunFailed
 from ibfil.fields import GridFields
+from ibfil.fields_inertia import InertialFields
 from ibfil.fluid import Held
 from ibfil.grid import Grid, interpolate
 from ibfil.immersed_boundary import Immersed, Nodes
-from ibfil.inertial_fields import InertialFields
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import Background, NavierStokes, Room
 from ibfil.past import Past, Weights

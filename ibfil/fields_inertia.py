@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .advection import filters
-from .fields import Flow, GridFields
+from .fields import GridFields
+from .fluid import Flow
 
 if TYPE_CHECKING:
     from .navier_stokes import NavierStokes
