@@ -1,5 +1,7 @@
 """The approximations a user may ask for: the sub-cell-averaged table, and single precision; how far they are off."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scenes import STOKES, swimmer
@@ -12,14 +14,19 @@ from ibfil.simulation import Simulation
 GRID = Grid([3.2, 2.4, 4.0], [32, 24, 40])
 
 
+@cache
+def _tables(name):
+    response = mobility.point_response(GRID, 1.0)
+    return mobility.octant(response, KERNELS[name].points), mobility_averaged.table(response, KERNELS[name])
+
+
 def _exact(kernel, r, number=np.float64):
-    table = mobility.octant(mobility.point_response(GRID, 1.0), kernel.points).astype(number)
+    table = _tables(kernel.name)[0].astype(number)
     return mobility.mobility(table, GRID.cells, *kernel.stencil(GRID.coordinates(r)), np.zeros(len(r)))
 
 
 def _average(kernel, r):
-    table = mobility_averaged.table(mobility.point_response(GRID, 1.0), kernel)
-    return mobility_averaged.mobility(table, GRID.cells, GRID.coordinates(r), np.zeros(len(r)))
+    return mobility_averaged.mobility(_tables(kernel.name)[1], GRID.cells, GRID.coordinates(r), np.zeros(len(r)))
 
 
 STATED = {"peskin4": (3.6e-3, 1.0e-2), "roma3": (1.1e-2, 2.7e-2), "bkp6": (2.8e-4, 7e-4), "es6": (2.6e-4, 7e-4)}

@@ -246,6 +246,7 @@ def test_a_hostile_case_inside_a_run_file_does_nothing(here):
     import h5py
 
     run(case("", "time.end=0.1"), here / "run.h5")
+    assert main(["vtk", "run.h5", "-o", "out"]) == 0  # loaded here, not in each of the processes to come
     for text in (
         "",
         "title = 1",
