@@ -11,6 +11,7 @@ from scenes import RFT, STOKES, run, scene, slopes
 from scipy.optimize import brentq
 
 from ibfil.fluid import Held
+from ibfil.simulation import Simulation
 
 PERP, PAR = 4 * np.pi, 2 * np.pi
 ROD: Mapping[str, Any] = {"length": 1.0, "nodes": 13, "derivative": 2, "bending": 1.0, "stretching": 1e4}
@@ -145,3 +146,14 @@ def test_the_flow_is_in_the_velocity_field_that_is_written() -> None:
     x = simulation.grid.origin[0] + simulation.grid.spacing * np.arange(32)
     assert field[..., 0] == pytest.approx(np.full((32, 32, 32), 0.5), abs=1e-6)
     assert field[..., 1] == pytest.approx(np.broadcast_to(0.1 * np.sin(np.pi * x)[:, None, None], (32,) * 3), abs=1e-6)
+
+
+def test_a_fluid_with_inertia_knows_the_time_of_its_flow_in_steps_of_any_length() -> None:
+    """Euler, BDF2, and BDF2 with half the step."""
+    fluid = {**STOKES, "model": "navier-stokes", "density": 1.0, "flow": ["0", "0.1*sin(pi*x)*cos(9*t)", "0"]}
+    simulation = Simulation(scene({"rod": ROD}, fluid, end=0.025, step=0.01))
+    for until in (0.02, 0.025):
+        simulation.advance(until, lambda: None)
+    assert simulation.steps == 3
+    assert simulation.fluid.time == pytest.approx(0.025, rel=1e-13)
+    assert simulation.fluid.past.dt_old == pytest.approx(0.005, rel=1e-12)

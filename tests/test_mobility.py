@@ -212,4 +212,4 @@ def test_spectrum_of_a_rod_whose_nodes_are_closer_than_cells():
     m = mobility.mobility(table, grid.cells, base, weights, np.zeros(41)).reshape(123, 123)
     values = np.linalg.eigvalsh(m)
     assert values.max() == pytest.approx(12.5668, abs=1e-3)
-    assert values.min() == pytest.approx(1.557e-6, rel=0.01)
+    assert values.min() == pytest.approx(1.557e-6, abs=0.0005e-6)  # four digits

@@ -112,7 +112,8 @@ def test_gray_and_hancock_are_wrong_by_more_than_twice_at_small_pitch():
         length, cos = p["turns"] * p["turn"], p["c"]
         rft = length * p["R"] * (p["par"] - p["perp"]) * np.sqrt(1 - cos**2) * cos
         ratios[pitch] = rft / np.linalg.inv(mobility)[0, 1]
-    assert 2.4 < ratios[0.4] < 3.0
+    # Regression bounds but for the first, which is the claim; the last two say that the error goes with the pitch.
+    assert 2 < ratios[0.4] < 3.0
     assert 1.0 < ratios[0.8] < 1.5
     assert 0.7 < ratios[1.6] < 1.0
 
@@ -201,5 +202,5 @@ def test_the_onset_nears_that_of_slender_rods_as_the_grid_is_refined():
             return growth(shipped("whirling_stirred", f"parameters.ratio={ratio}", STRAIGHT, *grid)).real
 
         onsets.append(brentq(rate, 5.5, 8, xtol=1e-2))
-    assert 6.15 < onsets[0] < 6.35  # b/L = 0.075; its ends are worth three radii of rod
+    assert 6.15 < onsets[0] < 6.35  # b/L = 0.075, ends worth three radii of rod; what was found: a regression bound
     assert onsets[0] + 0.3 < onsets[1] < 7.14

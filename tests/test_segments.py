@@ -102,10 +102,10 @@ def test_pulled_points_move_smoothly_where_segments_turn_past_parallel():
 
 @pytest.mark.parametrize("where", [0.0, 0.2, 0.5])
 def test_pulled_points_of_crossing_segments_are_the_closest_within_the_pull(where):
+    """Least is (a - where)^2 + pull (a - 1/2)^2 along the first."""
     a, b, d, _ = between([-where, 0, 0.1], [1 - where, 0, 0.1], [0, -0.5, 0], [0, 0.5, 0], pull=0.01)
-    assert a == pytest.approx(where, abs=0.005)
-    assert b == pytest.approx(0.5)
-    assert d == pytest.approx(0.1, rel=2e-3)
+    assert (a, b) == pytest.approx(((where + 0.01 / 2) / (1 + 0.01), 0.5), rel=1e-13)
+    assert d == pytest.approx(np.hypot(0.1, a - where), rel=1e-13)
 
 
 # --- the search -----------------------------------------------------------------------------------------------------
