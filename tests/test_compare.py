@@ -116,6 +116,7 @@ class Moved:
         }
         self.filaments = {"rod": columns}
         self.diagnostics = {"power": np.sin(5 * self.time) ** 2, "dissipation": np.full(n, 0.25)}
+        self.arclength = {"rod": s}.__getitem__
 
 
 def test_means_are_over_whole_periods_and_exact():
