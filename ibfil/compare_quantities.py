@@ -129,7 +129,10 @@ def _frequency(times: np.ndarray, tip: np.ndarray, window: Window) -> Quantity |
 
 
 def _powers(run: RunFile, window: Window) -> dict[str, Quantity]:
-    """The dissipated power from both sides, and what the slip takes of it."""
+    """The dissipated power from both sides, and what is lost on the way there: by slip, and by a rod's own spin drag.
+
+    A fluid with inertia is set in motion by what it does not dissipate.
+    """
     unit = label(run.case.units, "force length/time")
     read: Callable[[str], np.ndarray] = lambda name: np.asarray(run.diagnostics[name])  # noqa: E731
     out = {"power of the nodes": quantity(_means(run.time, read("power"), window), unit)}
@@ -138,11 +141,15 @@ def _powers(run: RunFile, window: Window) -> dict[str, Quantity]:
     if "grid_power" in run.diagnostics:
         grid, slip = (_means(run.time, read(name), window) for name in ("grid_power", "slip_power"))
         out["power upon the grid"] = quantity(grid, unit)
-        inside = (run.time >= window.start * (1 - 1e-9)) & (read("grid_power") != 0)
-        ratio = read("dissipation")[inside] / read("grid_power")[inside] - 1
-        if len(ratio):
-            out["both sides differ by, at most"] = Quantity(float(np.max(np.abs(ratio))), None, "1")
-        out["slip's share of the power"] = quantity(slip / (grid + slip), "1")
+        if run.case.fluid.model == "navier-stokes":
+            moving = _means(run.time, read("grid_power") - read("dissipation"), window)
+            out["of that into the fluid's motion"] = quantity(moving, unit)
+        else:
+            inside = (run.time >= window.start * (1 - 1e-9)) & (read("grid_power") != 0)
+            ratio = read("dissipation")[inside] / read("grid_power")[inside] - 1
+            if len(ratio):
+                out["both sides differ by, at most"] = Quantity(float(np.max(np.abs(ratio))), None, "1")
+        out["lost between nodes and grid, a share"] = quantity(slip / (grid + slip), "1")
     return out
 
 

@@ -126,6 +126,9 @@ def _legend(fig, made: Map) -> None:
               label=f"{_LETTERS[CLASSES.index(kind)]}  {_WORDS[_LETTERS[CLASSES.index(kind)]]}".strip())
         for kind in seen
     ]  # fmt: skip
-    if any(cell.predicted for cell in made.cells):
+    predicted = [bool(cell.predicted) for cell in made.cells]
+    if all(predicted):
+        marks.append(Line2D([], [], lw=0, label="all predicted to be amiss"))
+    elif any(predicted):
         marks.append(Line2D([], [], color="black", lw=2.4, label="predicted limit"))
     fig.legend(handles=marks, loc="outside right center", fontsize=7.5)

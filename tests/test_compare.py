@@ -60,7 +60,12 @@ def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(made):
     assert comparison.window.count == 1
     assert comparison.window.period == pytest.approx(2 * np.pi / 10, rel=1e-4)
     assert by["stokes"]["both sides differ by, at most"].value < 1e-10
-    assert 0 < by["stokes"]["slip's share of the power"].value < 0.2  # far from all; the number: test_dissipation.py
+    lost = by["stokes"]["lost between nodes and grid, a share"].value
+    assert 0 < lost < 0.2  # far from all; the number: test_dissipation.py
+    inertial = {key: one.value for key, one in by["navier-stokes"].items()}
+    assert "both sides differ by, at most" not in inertial  # one side is not the other while the fluid speeds up
+    moving = inertial["power upon the grid"] - inertial["dissipated by the fluid"]
+    assert inertial["of that into the fluid's motion"] == pytest.approx(moving)
     assert by["rft"]["dissipated by the fluid"].value == pytest.approx(by["rft"]["power of the nodes"].value)
     turning = [numbers["frequency (angular)"].value for numbers in by.values() if "frequency (angular)" in numbers]
     assert turning
