@@ -177,12 +177,14 @@ def _costs(simulation: Simulation) -> list[str]:
             "which takes as long as the step itself or twice that"
         )
     lines.append(f"disk at most {_bytes(disk(simulation))}, fields compressed")
-    steps = case.time.end / simulation.step_length
-    seconds = steps * simulation.method_seconds[simulation.method]
     if simulation.grid is not None:
         others = ", ".join(f"{k} {v:.2g}" for k, v in simulation.method_seconds.items() if np.isfinite(v))
         lines.append(f"seconds a step, from counts: {others}")
-    lines.append(f"about {steps:.0f} steps, {seconds:.2g} s after start-up, from counts (within a factor 3)")
+    steps, seconds = case.time.end / simulation.step_length, simulation.method_seconds[simulation.method]
+    total = f"about {steps:.0f} steps, {steps * seconds:.2g} s after start-up"
+    if case.time.tolerance is not None:
+        total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
+    lines.append(f"{total}, from counts (within a factor 3)")
     return lines
 
 
@@ -190,8 +192,11 @@ def _steps(simulation: Simulation) -> list[str]:
     case = simulation.case
     chosen = "automatic" if case.time.step == "auto" else "given"
     scheme = case.time.scheme if case.thermal is None else "linearised trapezoid (semi-implicit)"
+    length = f"dt = {simulation.step_length:.4g} ({chosen})"
+    if case.time.tolerance is not None:
+        length = f"dt = {simulation.step_length:.4g} at first, then what an error of {case.time.tolerance:g} allows"
     lines = [
-        f"{scheme}, order {case.time.order}: dt = {simulation.step_length:.4g} ({chosen})",
+        f"{scheme}, order {case.time.order}: {length}",
         f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
     ]

@@ -24,7 +24,7 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
         if case.fluid.model == "navier-stokes":
             assert case.fluid.density is not None
             out["Re = rho omega L^2/eta"] = case.fluid.density * rate * length**2 / case.fluid.viscosity
-    if simulation.cycles:
+    if simulation.cycles and case.time.tolerance is None:  # with one, steps are not known beforehand
         out["omega dt"] = max(simulation.cycles) * simulation.step_length
     stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
     out["EA L^2/A"] = stretching * length**2 / bending

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import RFT, scene
 
-from ibfil.check import modelled
+from ibfil.check import modelled, report
 from ibfil.simulation import Simulation
 
 PERP = 4 * np.pi
@@ -84,6 +84,14 @@ def test_only_what_oscillates_has_an_omega_dt_to_be_warned_of() -> None:
         assert ("omega dt" in simulation.groups) == (name == "wave")
         assert any("omega dt = 3" in line for line in simulation.warnings) == (name == "wave")
         assert "sperm number" in simulation.groups
+
+
+def test_steps_that_a_tolerance_chooses_are_not_foretold() -> None:
+    case = scene({"rod": {**ROD, "curvature": [WAVE, 0]}}, end=10.0, tolerance=1e-3)
+    told = report(case)
+    assert "omega dt" not in told
+    assert "as many steps as time.tolerance asks for" in told
+    assert "at first, then what an error of 0.001 allows" in told
 
 
 def test_the_report_names_every_load_and_law() -> None:
