@@ -55,7 +55,7 @@ def solved(nodes: int, parts: int = 3) -> float:
 
 def factored(nodes: int, parts: int = 3) -> float:
     """Seconds of a rod's own exact matrix and its factors."""
-    return 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1.0) + solved(nodes, parts)
+    return _table(nodes, parts) + solved(nodes, parts)
 
 
 def of_rods(case: Case, nodes: int, scheme: str = "") -> float:
@@ -80,60 +80,42 @@ def seconds_a_step(
     ``rods`` are the nodes of each filament, ``sizes`` (3,) the extents of their bounding box in cells, ``parts``
     how many numbers of a node go through the grid (4: torques too). The table is out where it does not fit.
     """
-    rounds, nodes = _ROUNDS[case.time.scheme], sum(rods)
+    nodes = sum(rods)
     local = of_rods(case, nodes)
     if cells is None or sizes is None:
         return {"rft": local}
+    whole = (parts - 2) * (full_evaluation(cells) + nodes * _SPREAD)
     if case.fluid.model == "navier-stokes":
-        return _with_inertia(case, parts, rods, cells)
+        return _by_method(case, rods, parts, local + of_inertia(cells, parts), {"fft": whole})
     if parts == 4:
-        return _with_torques(rounds, rods, cells)
-    build = 0.5 * nodes**2 * _PAIR
-    full = full_evaluation(cells) + nodes * _SPREAD
+        return _by_method(case, rods, parts, local, {"fft": whole})
     pruned = pruned_evaluation(cells, sizes) + nodes * _SPREAD
+    found = _by_method(case, rods, parts, local, {"fft": whole, "pruned": pruned})
+    return {**found, "averaged": found["table"] + (_AVERAGED - 1) * _table(nodes, parts)}
+
+
+def _table(nodes: int, parts: int) -> float:
+    """Seconds of all pairs of nodes in the mobility table."""
+    return 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1.0)
+
+
+def _by_method(
+    case: Case, rods: Sequence[int], parts: int, local: float, evaluations: dict[str, float]
+) -> dict[str, float]:
+    """Seconds by the table, by the transforms of ``evaluations`` (seconds of one each), and by Krylov on the cheapest.
+
+    ``local`` is what a step takes whatever answers to the forces.
+    """
+    rounds, nodes, cheapest = _ROUNDS[case.time.scheme], sum(rods), min(evaluations.values())
+    build = _table(nodes, parts)
     if case.time.scheme == "explicit":
-        averaged = local + build * _AVERAGED
-        return {"table": local + build, "averaged": averaged, "fft": local + full, "pruned": local + pruned}
-    exact = build + rounds * solved(nodes)
-    fits = dense_bytes(nodes) < _LARGEST
-    return {
-        "table": local + exact if fits else np.inf,
-        "averaged": local + exact + (_AVERAGED - 1) * build if fits else np.inf,
-        "fft": local + exact + 4 * rounds * full if fits else np.inf,
-        "pruned": local + exact + 4 * rounds * pruned if fits else np.inf,
-        "krylov": local + _PRODUCTS * rounds * min(full, pruned) + sum(map(factored, rods)),
-    }
-
-
-def _with_inertia(case: Case, parts: int, rods: Sequence[int], cells: Sequence[int]) -> dict[str, float]:
-    """The same with a past and advection: 15 components through FFTs a step, whatever answers to the forces."""
-    rounds, nodes = _ROUNDS[case.time.scheme], sum(rods)
-    vectors, build = parts - 2, 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1)
-    full = vectors * (full_evaluation(cells) + nodes * _SPREAD)
-    local = of_rods(case, nodes) + of_inertia(cells, parts)
-    if case.time.scheme == "explicit":
-        return {"table": local + build, "fft": local + full}
-    exact = build + rounds * solved(nodes, parts)
-    fits = dense_bytes(nodes, parts) < _LARGEST
-    return {
-        "table": local + exact if fits else np.inf,
-        "fft": local + exact + 4 * rounds * full if fits else np.inf,
-        "krylov": local + _PRODUCTS * rounds * full + sum(factored(k, parts) for k in rods),
-    }
-
-
-def _with_torques(rounds: int, rods: Sequence[int], cells: Sequence[int]) -> dict[str, float]:
-    """The same with four unknowns a node, fifteen components a pair and twice the transforms."""
-    nodes = sum(rods)
-    local, build = rounds * nodes * _NODE, 0.5 * nodes**2 * _PAIR * _COMPONENTS
-    full = 2 * (full_evaluation(cells) + nodes * _SPREAD)
-    exact = build + rounds * solved(nodes, 4)
-    fits = dense_bytes(nodes, 4) < _LARGEST
-    return {
-        "table": local + exact if fits else np.inf,
-        "fft": local + exact + 4 * rounds * full if fits else np.inf,
-        "krylov": local + _PRODUCTS * rounds * full + sum(factored(k, 4) for k in rods),
-    }
+        by_transforms = {name: local + one for name, one in evaluations.items()}
+        return {"table": local + build, **by_transforms, "krylov": local + cheapest}
+    # Transforms have the exact matrix of all nodes for a preconditioner, Krylov that of each rod.
+    exact = local + build + rounds * solved(nodes, parts) if dense_bytes(nodes, parts) < _LARGEST else np.inf
+    made = sum(factored(k, parts) for k in rods)
+    by_transforms = {name: exact + 4 * rounds * one for name, one in evaluations.items()}
+    return {"table": exact, **by_transforms, "krylov": local + _PRODUCTS * rounds * cheapest + made}
 
 
 def dense_bytes(nodes: int, parts: int = 3) -> float:
