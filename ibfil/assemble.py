@@ -18,7 +18,7 @@ from . import assemble_fluid, assemble_laws, shape_copies, shapes, stepping
 from .assemble_loads import loads, number, triple
 from .assemble_profiles import along, half
 from .case_filament import copy_name
-from .ends import EndOf, HeldEnds, Turn, spinning, steady, turned
+from .ends import HeldEnd, HeldEnds, Turn, spinning, steady, turned
 from .errors import CaseError
 from .geometry import Geometry
 from .mechanics import Mechanics
@@ -119,7 +119,7 @@ def _ends(filaments, nodes, unknowns: int) -> tuple[HeldEnds, np.ndarray]:
             free[node] = end.end != "clamped"
             if end.end != "free":
                 moves = None if end.moves is None else triple(end.moves, "t")
-                held.append(EndOf(node, _turn(end), moves))
+                held.append(HeldEnd(node, _turn(end), moves))
         if unknowns == 4 and filament.twisting is None:
             idle += range(where.start, where.stop)
     return HeldEnds(held, unknowns, np.array(idle, np.int64)), free

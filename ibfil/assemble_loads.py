@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .loads import ActiveMoment, BodyForce, Dead, EndMoment, Follower, Place, Tether
+from .loads import ActiveMoment, BodyForce, DeadForce, EndMoment, Follower, ForceField, Tether
 from .mesh import Mesh
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def _on_end(end: End, node: int, finish: bool, mesh: Mesh, torque_free: bool) ->
         out.append(Follower(node, number(end.follower)))
     if end.force is not None:
         force = triple(end.force, "t")
-        out.append(Dead(at, lambda t: force(t)[None]))
+        out.append(DeadForce(at, lambda t: force(t)[None]))
     if end.moment is not None:
         out.append(EndMoment(mesh, node, finish, triple(end.moment, "t"), end.frame == "body", torque_free))
     if end.spring is not None:
@@ -75,10 +75,10 @@ def _along(filament: Filament, where: slice, s: np.ndarray, mesh: Mesh, start: n
         force = triple(given.force, "s", "t", "x", "y", "z")
         if any(e.variables & {"x", "y", "z"} for e in given.force):
             reach = _DIFFERENCE * filament.length
-            out.append(Place(nodes, lambda r, t: volume * force(s, t, *r.T), reach))
+            out.append(ForceField(nodes, lambda r, t: volume * force(s, t, *r.T), reach))
         else:
             zero = np.zeros_like(s)
-            out.append(Dead(nodes, lambda t: volume * force(s, t, zero, zero, zero)))
+            out.append(DeadForce(nodes, lambda t: volume * force(s, t, zero, zero, zero)))
     if given.body_force is not None:
         parts = triple(given.body_force, "s", "t")
         out.append(BodyForce(nodes, lambda t: volume * parts(s, t)))
@@ -86,7 +86,7 @@ def _along(filament: Filament, where: slice, s: np.ndarray, mesh: Mesh, start: n
         out.append(ActiveMoment(mesh, _over_all(triple(given.moment, "s", "t"), where, s, len(mesh.ds))))
     if given.weight is not None:
         weight = volume * np.array(given.weight)
-        out.append(Dead(nodes, lambda t: weight))
+        out.append(DeadForce(nodes, lambda t: weight))
     if given.tether is not None:
         stiffness = given.tether.stiffness * volume[:, 0]
         if given.tether.to == "initial":

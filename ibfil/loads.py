@@ -42,7 +42,7 @@ class Follower:
         variation.tangent(self.node, _forces(self.size(time) * np.eye(3)[None], variation.m))
 
 
-class Dead:
+class DeadForce:
     """A force given in the lab, ``force(t)`` (k, 3), on the nodes ``nodes`` (k,): an end force, a weight."""
 
     def __init__(self, nodes: np.ndarray, force: OfTime) -> None:
@@ -56,7 +56,7 @@ class Dead:
         """Nothing: it does not follow."""
 
 
-class Place:
+class ForceField:
     """A force that depends on where the nodes are, ``force(r, t)`` (k, 3) on nodes (k,)."""
 
     def __init__(self, nodes: np.ndarray, force: Callable[[np.ndarray, float], np.ndarray], reach: float) -> None:

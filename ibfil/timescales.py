@@ -17,7 +17,7 @@ from .assemble_loads import triple
 from .expressions import Expression
 from .fluid import Fluid, Held
 from .geometry import Geometry
-from .loads import BodyForce, Dead, Follower, Place
+from .loads import BodyForce, DeadForce, Follower, ForceField
 from .mechanics import Mechanics
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def pushes(simulation: Simulation) -> list[float]:
     times = np.linspace(0.0, case.time.end, 101)
     slowest = min(simulation.drag(f) * f.length**2 for f in case.filaments.values())
     for load in simulation.mechanics.loads:
-        if isinstance(load, (Follower, Dead, Place, BodyForce)):
+        if isinstance(load, (Follower, DeadForce, ForceField, BodyForce)):
             size = max(float(np.linalg.norm(_force(simulation, load, t), axis=1).sum()) for t in times)
             rates.append(2 * np.pi * size / slowest)
     flow = assemble_fluid.flow(case)

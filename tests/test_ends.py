@@ -11,7 +11,7 @@ from scenes import run, scene, slopes, twisting_rod
 
 from ibfil import assemble, assemble_fluid, banded, rft, stepping
 from ibfil.case import Case
-from ibfil.ends import EndOf, HeldEnds, spinning, steady, turned
+from ibfil.ends import HeldEnd, HeldEnds, spinning, steady, turned
 from ibfil.fluid import Held
 from ibfil.simulation import Simulation
 from ibfil.stepping import Implicit, State, Step
@@ -73,15 +73,15 @@ def test_prescribed_motion_is_turn_and_displacement_between_two_times() -> None:
     def place(t: float) -> np.ndarray:
         return np.array([t, t**2, 0.0])
 
-    ends = HeldEnds([EndOf(0, steady(2.0)), EndOf(5, turned(lambda t: t**3), place)], 4, np.array([7]))
+    ends = HeldEnds([HeldEnd(0, steady(2.0)), HeldEnd(5, turned(lambda t: t**3), place)], 4, np.array([7]))
     assert list(ends.index) == [0, 1, 2, 3, 20, 21, 22, 23, 31]
     expected = [0, 0, 0, 1.0, 0.5, 1.25, 0, 3.375 - 1.0, 0]
     assert ends.motion(1.0, 1.5) == pytest.approx(expected, abs=4 * EPS)
-    assert HeldEnds([EndOf(0, spinning(lambda t: 3 * t**2))], 4, np.array([], int)).motion(1.0, 1.5)[
+    assert HeldEnds([HeldEnd(0, spinning(lambda t: 3 * t**2))], 4, np.array([], int)).motion(1.0, 1.5)[
         3
     ] == pytest.approx(3.375 - 1.0, rel=4 * EPS)
     # Without twist unknowns e1 has no turn of its own.
-    assert list(HeldEnds([EndOf(2, steady(0.0))], 3, np.array([], int)).index) == [6, 7, 8]
+    assert list(HeldEnds([HeldEnd(2, steady(0.0))], 3, np.array([], int)).index) == [6, 7, 8]
 
 
 # Held ends stay where they are
