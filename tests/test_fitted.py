@@ -113,6 +113,16 @@ def test_frequency_of_flailing_in_a_plane_is_positive(times):
         assert value(f'kind = "frequency"\nalong = {along}', motion, times) == pytest.approx(3.21, rel=1e-6)
 
 
+def test_to_and_fro_on_an_arc_about_the_axis_is_no_rotation():
+    """Turns one way and as far back: three harmonics fit it to 2 J5(0.9) = 3e-4 of its width."""
+
+    def motion(t):
+        angle = 0.9 * np.sin(3.21 * t)
+        return tip_at(2, np.cos(angle), np.sin(angle))
+
+    assert value('kind = "frequency"', motion, EVEN) == pytest.approx(3.21, rel=3e-4)
+
+
 def test_frequency_of_a_growing_oscillation():
     def motion(t):
         return tip_at(2, 0.01 * np.exp(0.4 * t) * np.cos(3.21 * t), 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibfil.grid import Grid, clear, interpolate, project, spread
+from ibfil.grid import Grid, cells_for, clear, interpolate, project, spread
 from ibfil.kernels import KERNELS
 
 KERNEL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
@@ -15,6 +15,13 @@ H = 0.3
 
 def grid_of(cells: tuple[int, int, int]) -> Grid:
     return Grid([n * H for n in cells], cells)
+
+
+def test_the_grid_of_a_thickness_is_the_next_smooth_one_less_than_20_per_cent_finer() -> None:
+    """Seven cells a side have a factor of 7; eight are 1.21 or 1.27 times as fine as what is asked for."""
+    assert cells_for([1.0, 2.0, 1.0], 1 / 6.6) == (8, 16, 8)
+    assert cells_for([1.0, 2.0, 1.0], 1 / 6.3) is None
+    assert cells_for([1.0, 2.0, 1.0], 1 / 6.0) == (6, 12, 6)
 
 
 def scattered(grid: Grid, count: int, seed: int = 0) -> np.ndarray:
