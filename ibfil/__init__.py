@@ -36,7 +36,8 @@ Modules by what they are about; a common first word means one subject:
     results       frames diagnostics record recorder journal checkpoint examine units observe observables
                   observables_fitted observables_place time_series stops expectations energy recorded_flow analysis
     commands      cli cli_studies check dimensionless scene_warnings budget show show_figure vtk vtk_data vtk_scene
-                  render render_stage render_lettering render_viewpoint wrapping figure_style verify shipped
+                  render render_stage render_streamlines render_lettering render_viewpoint wrapping figure_style
+                  verify shipped
     studies       study study_members study_workers study_distance sweep compare compare_quantities compare_figure
                   trade trade_reference trade_figure stability stability_figure
     speed         bench bench_many bench_threads

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .render_streamlines import evenly_spaced
 from .render_viewpoint import Viewpoint
 from .vtk_data import filament_data
 
@@ -21,6 +22,7 @@ TIMES = "viridis"  # all eyes can order it
 FLOW = "Greys"
 ARROWS = 26  # along the width of a picture
 SHEET = 160  # points along the width of a slice
+LINES_APART = 7  # of these points, between two streamlines
 
 
 THIN = 0.012  # of half the picture's height: the radius of tubes of which many are shown at once
@@ -162,26 +164,22 @@ class Stage:
 
         self.slice(time, fastest)
         across, up, u = self._sample(time, SHEET)
-        step = across[1, 0] - across[0, 0]
-        sheet = pyvista.ImageData(dimensions=(*across.shape, 1), spacing=(step, up[0, 1] - up[0, 0], 1.0))
-        flat = np.stack([u @ self._frame.right, u @ self._frame.look.up, np.zeros(across.shape)], axis=-1)
-        sheet["flow"] = flat.reshape(-1, 3, order="F")
-        middle = np.array([*(0.5 * np.array(across.shape)).astype(int), 0]) * np.array(sheet.spacing)
-        lines = sheet.streamlines_evenly_spaced_2D(
-            vectors="flow",
-            start_position=tuple(middle),
-            separating_distance=7.0,
-            step_length=0.5,
-            compute_vorticity=False,
-        )
-        points = lines.points
-        lines.points = self._frame.at(points[:, 0] + across[0, 0], points[:, 1] + up[0, 0]) + 0.98 * self._behind
+        x, y = across[:, 0], up[0]
+        gap = LINES_APART * (x[1] - x[0])
+        found = evenly_spaced(x, y, u @ self._frame.right, u @ self._frame.look.up, gap)
+        lines = [self._frame.at(line[:, 0], line[:, 1]) + 0.98 * self._behind for line in found if len(line) > 2]
+        if not lines:
+            return
+        starts = np.cumsum([0, *map(len, lines)])
+        cells = [[len(line), *range(start, start + len(line))] for line, start in zip(lines, starts, strict=False)]
+        drawn = pyvista.PolyData(np.vstack(lines), lines=np.hstack(cells))
         self._plotter.add_mesh(
-            lines, color="#505050", line_width=1.5, lighting=False, name="streamlines", reset_camera=False
+            drawn, color="#505050", line_width=1.5, lighting=False, name="streamlines", reset_camera=False
         )
-        heads = pyvista.PolyData(lines.points[_middles(lines)])
-        u = np.asarray(lines["flow"])[_middles(lines)]
-        heads["flow"] = u[:, :1] * self._frame.right + u[:, 1:2] * self._frame.look.up
+        long = [line for line in lines if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() > 1.5 * gap]
+        middles = [len(line) // 2 for line in long]
+        heads = pyvista.PolyData(np.reshape([line[k] for line, k in zip(long, middles, strict=True)], (-1, 3)))
+        heads["flow"] = np.reshape([line[k] - line[k - 1] for line, k in zip(long, middles, strict=True)], (-1, 3))
         size = 0.035 * self._frame.half
         cones = heads.glyph(orient="flow", scale=False, factor=size, geom=pyvista.Cone(radius=0.35, height=1.0))
         self._plotter.add_mesh(cones, color="#505050", lighting=False, name="heads", reset_camera=False)
@@ -204,17 +202,6 @@ class Stage:
     def close(self) -> None:
         """Give the window back."""
         self._plotter.close()
-
-
-def _middles(lines: pyvista.PolyData) -> np.ndarray:
-    """The numbers of the points in the middle of each of the lines that are longer than a few steps."""
-    cells, found, at = lines.lines, [], 0
-    while at < len(cells):
-        count = cells[at]
-        if count > 20:
-            found.append(cells[at + 1 + count // 2])
-        at += count + 1
-    return np.array(found, int)
 
 
 QUANTITIES = {  # what a tube can be coloured by: words, dimension, whether it has a sign
