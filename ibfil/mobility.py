@@ -55,29 +55,57 @@ def octant(response: np.ndarray, points: int) -> np.ndarray:
     return table.reshape(*table.shape[:2], -1)
 
 
+@njit(cache=True, inline="always")
+def _plane_sums(table, corner, c, acc, unit, points):
+    """The sums over x and y into ``acc`` (k terms,).
+
+    Written so that the compiler takes neighbours in ``acc`` together. Up to four points it unrolls both sums, and keeps
+    each in a register until it is whole; beyond, only that over x.
+    """
+    p = len(points)
+    terms, length = 2 * p - 1, len(unit) * (2 * p - 1)
+    at_x, at_y, at_z = corner
+    if p <= 4:
+        for k in range(length):
+            plane = 0.0
+            for j in range(2 * p - 1):
+                line = 0.0
+                for i in range(2 * p - 1):
+                    line += c[0, i] * table[at_x + i, at_y + j, at_z + k]
+                plane += c[1, j] * line
+            acc[k] = plane
+    else:
+        for k in range(length):
+            acc[k] = 0.0
+        for j in range(terms):
+            for k in range(length):
+                line = 0.0
+                for i in range(2 * p - 1):
+                    line += c[0, i] * table[at_x + i, at_y + j, at_z + k]
+                acc[k] += c[1, j] * line
+
+
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit):
+def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit, points):
     """All components of the table for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
 
-    ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` a tuple of k entries: what the compiler
-    knows of k. Returns the signs (3,) of the mirrored axes, for components beyond the sixth. Arrays are indexed in full
-    in every loop: a view of one costs more than the arithmetic.
+    ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` and ``points`` tuples of k and of P
+    entries: what the compiler knows of k and P. Returns the signs (3,) of the mirrored axes, for components beyond the
+    sixth. Arrays are indexed in full in every loop: a view of one costs more than the arithmetic.
     """
-    p = weights.shape[2]
-    terms, parts = 2 * p - 1, len(unit)
-    length = parts * terms
+    p, parts = len(points), len(unit)
     corner = (0, 0, 0)
     sign = (1.0, 1.0, 1.0)
     for axis in range(3):
         n = cells[axis]
         d = (base[a, axis] - base[b, axis]) % n
         mirrored = d > n // 2
-        for m in range(terms):
+        u, v = (b, a) if mirrored else (a, b)  # seen from the other node the axis points the other way
+        for m in range(2 * p - 1):
             c[axis, m] = 0.0
-        for i in range(p):
-            for j in range(p):
-                m = j - i if mirrored else i - j
-                c[axis, m + p - 1] += weights[a, axis, i] * weights[b, axis, j]
+        for i in range(len(points)):
+            for j in range(len(points)):
+                c[axis, i - j + p - 1] += weights[u, axis, i] * weights[v, axis, j]
         at, s = (n - d, -1.0) if mirrored else (d, 1.0)
         at &= NOT_NEGATIVE
         if axis == 0:
@@ -86,18 +114,12 @@ def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit):
             corner, sign = (corner[0], at, 0), (sign[0], s, 1.0)
         else:
             corner, sign = (corner[0], corner[1], parts * at), (sign[0], sign[1], s)
-    for k in range(length):
-        acc[k] = 0.0
-    for i in range(terms):
-        for j in range(terms):
-            w = c[0, i] * c[1, j]
-            for k in range(length):
-                acc[k] += w * table[corner[0] + i, corner[1] + j, corner[2] + k]
+    _plane_sums(table, corner, c, acc, unit, points)
     for x in range(parts):
-        sums[x] = 0.0
-    for k in range(terms):
-        for x in range(parts):
-            sums[x] += c[2, k] * acc[parts * k + x]
+        total = 0.0
+        for k in range(2 * p - 1):
+            total += c[2, k] * acc[parts * k + x]
+        sums[x] = total
     sums[3] *= sign[0] * sign[1]
     sums[4] *= sign[0] * sign[2]
     sums[5] *= sign[1] * sign[2]
@@ -105,18 +127,14 @@ def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit):
 
 
 @njit(cache=True)
-def pairs(table, cells, base, weights, slip, rows, columns):
-    """The mobility (len(rows), 3, len(columns), 3) between nodes, with slip[i] added on the diagonal of node i.
-
-    ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils, ``table`` the octant.
-    """
-    terms = 2 * weights.shape[2] - 1
+def _pairs(table, cells, base, weights, slip, rows, columns, points):
+    terms = 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((rows.size, 3, columns.size, 3))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX)
+            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX, points)
             for x in range(3):
                 out[i, x, j, x] = sums[x] + (slip[a] if a == b else 0.0)
             out[i, 0, j, 1] = out[i, 1, j, 0] = sums[3]
@@ -126,15 +144,13 @@ def pairs(table, cells, base, weights, slip, rows, columns):
 
 
 @njit(cache=True)
-def mobility(table, cells, base, weights, slip):
-    """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
-    n = weights.shape[0]
-    terms = 2 * weights.shape[2] - 1
+def _mobility(table, cells, base, weights, slip, points):
+    n, terms = weights.shape[0], 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((n, 3, n, 3))
     for a in range(n):
         for b in range(a, n):
-            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX)
+            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX, points)
             for x in range(3):
                 out[a, x, b, x] = out[b, x, a, x] = sums[x]
             out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = sums[3]
@@ -143,6 +159,29 @@ def mobility(table, cells, base, weights, slip):
         for x in range(3):
             out[a, x, a, x] += slip[a]
     return out
+
+
+def pairs(
+    table: np.ndarray,
+    cells: np.ndarray,
+    base: np.ndarray,
+    weights: np.ndarray,
+    slip: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+) -> np.ndarray:
+    """The mobility (len(rows), 3, len(columns), 3) between nodes, with slip[i] added on the diagonal of node i.
+
+    ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils, ``table`` the octant.
+    """
+    return _pairs(table, cells, base, weights, slip, rows, columns, (0,) * weights.shape[2])
+
+
+def mobility(
+    table: np.ndarray, cells: np.ndarray, base: np.ndarray, weights: np.ndarray, slip: np.ndarray
+) -> np.ndarray:
+    """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
+    return _mobility(table, cells, base, weights, slip, (0,) * weights.shape[2])
 
 
 class Translation:

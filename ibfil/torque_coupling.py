@@ -79,18 +79,14 @@ def _between(sums, sign, d, e):
 
 
 @njit(cache=True)
-def pairs(table, cells, base, weights, axes, own, rows, columns):
-    """The mobility (len(rows), 4, len(columns), 4) between nodes with spin axes (n, 3); ``own`` (n, 4) on the diagonal.
-
-    ``axes`` are unit tangents, zero where a node does not twist: then no torque of it, and no spin.
-    """
-    terms = 2 * weights.shape[2] - 1
+def _pairs(table, cells, base, weights, axes, own, rows, columns, points):
+    terms = 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
     out = np.empty((rows.size, 4, columns.size, 4))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            sign = sum_pair(table, cells, base, weights, a, b, c, acc, sums, _FIFTEEN)
+            sign = sum_pair(table, cells, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
             if a == b:
                 sums[6:9] = 0.0  # odd, and so nothing but round-off
             for x in range(3):
@@ -108,15 +104,13 @@ def pairs(table, cells, base, weights, axes, own, rows, columns):
 
 
 @njit(cache=True)
-def mobility(table, cells, base, weights, axes, own):
-    """The whole matrix (n, 4, n, 4), symmetric to the last bit; arguments as for ``pairs``."""
-    n = weights.shape[0]
-    terms = 2 * weights.shape[2] - 1
+def _mobility(table, cells, base, weights, axes, own, points):
+    n, terms = weights.shape[0], 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
     out = np.empty((n, 4, n, 4))
     for a in range(n):
         for b in range(a, n):
-            sign = sum_pair(table, cells, base, weights, a, b, c, acc, sums, _FIFTEEN)
+            sign = sum_pair(table, cells, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
             if a == b:
                 sums[6:9] = 0.0  # odd, and so nothing but round-off
             for x in range(3):
@@ -130,6 +124,30 @@ def mobility(table, cells, base, weights, axes, own):
         for x in range(4):
             out[a, x, a, x] += own[a, x]
     return out
+
+
+def pairs(
+    table: np.ndarray,
+    cells: np.ndarray,
+    base: np.ndarray,
+    weights: np.ndarray,
+    axes: np.ndarray,
+    own: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+) -> np.ndarray:
+    """The mobility (len(rows), 4, len(columns), 4) between nodes with spin axes (n, 3); ``own`` (n, 4) on the diagonal.
+
+    ``axes`` are unit tangents, zero where a node does not twist: then no torque of it, and no spin.
+    """
+    return _pairs(table, cells, base, weights, axes, own, rows, columns, (0,) * weights.shape[2])
+
+
+def mobility(
+    table: np.ndarray, cells: np.ndarray, base: np.ndarray, weights: np.ndarray, axes: np.ndarray, own: np.ndarray
+) -> np.ndarray:
+    """The whole matrix (n, 4, n, 4), symmetric to the last bit; arguments as for ``pairs``."""
+    return _mobility(table, cells, base, weights, axes, own, (0,) * weights.shape[2])
 
 
 @njit(cache=True)
