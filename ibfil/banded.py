@@ -16,6 +16,7 @@ from scipy.linalg import solve_banded
 
 from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
 from .mesh import Mesh
+from .vectors import NOT_NEGATIVE
 
 
 class Profile(NamedTuple):
@@ -54,7 +55,7 @@ def profile(mesh: Mesh, neighbours: int = 1) -> Profile:
     return Profile(first, last, max(width, int(np.max(last - rows))))
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def multiply(matrix, x):
     """The product (n, m) of a band matrix with x (n, m)."""
     n, m = matrix.shape[:2]
@@ -69,6 +70,40 @@ def multiply(matrix, x):
             for k in range((high - low) * m):
                 s += matrix[i, a, shift + k] * flat[low * m + k]
             out[i, a] = s
+    return out
+
+
+@njit(cache=True, fastmath={"contract"})
+def transposed_product(matrix, full, factor):
+    """``factor`` K^T A (n, m, l) of a band matrix K and a full A (c n, l), c = 3 or 4: of K, the first c rows a node.
+
+    Three rows of A go into three of the product at a time, so that each number is fetched for three products.
+    """
+    n, m = matrix.shape[:2]
+    c, length, w = full.shape[0] // n, full.shape[1], (matrix.shape[2] // m - 1) // 2
+    out = np.zeros((n, m, length))
+    for j in range(n):
+        for i in range(max(0, j - w), min(n, j + w + 1)):
+            at, row = (j - i + w) * m, (c * i) & NOT_NEGATIVE
+            size = 0.0
+            for a in range(c):
+                for b in range(m):
+                    size += abs(matrix[i, a, at + b])
+            if size == 0.0:
+                continue
+            x0, y0, z0 = matrix[i, 0, at] * factor, matrix[i, 1, at] * factor, matrix[i, 2, at] * factor
+            x1, y1, z1 = matrix[i, 0, at + 1] * factor, matrix[i, 1, at + 1] * factor, matrix[i, 2, at + 1] * factor
+            x2, y2, z2 = matrix[i, 0, at + 2] * factor, matrix[i, 1, at + 2] * factor, matrix[i, 2, at + 2] * factor
+            for k in range(length):
+                x, y, z = full[row, k], full[row + 1, k], full[row + 2, k]
+                out[j, 0, k] += x0 * x + y0 * y + z0 * z
+                out[j, 1, k] += x1 * x + y1 * y + z1 * z
+                out[j, 2, k] += x2 * x + y2 * y + z2 * z
+            for b in range(m):
+                for a in range(3 if b < 3 else 0, c):
+                    x = matrix[i, a, at + b] * factor
+                    for k in range(length):
+                        out[j, b, k] += x * full[row + a, k]
     return out
 
 

@@ -33,23 +33,31 @@ class Newton(NamedTuple):
 
 
 class RodStiffness(NamedTuple):
-    """The stiffness of the unknowns that go through the fluid, rod by rod in full."""
+    """The stiffness of the unknowns that go through the fluid, and which of them are held."""
 
     band: np.ndarray  # (n, m, ..) by node
     held: np.ndarray  # (k,) those of them that are held, flat
     turns: np.ndarray | None  # (3, n) Zr/tau - K_pp by diagonals, unit rows where a turn is held; None: none apart
     still: np.ndarray | None  # (n,) zero where a turn is held
 
-    def matrix(self, rod: slice) -> np.ndarray:
-        """The stiffness (c k, c k) of one filament's k nodes, or of all; c unknowns a node go through the fluid."""
-        full = banded.dense(self.band[rod])
-        k, m = full.shape[:2]
-        if self.turns is None or self.still is None:
-            return full.reshape(m * k, m * k)
-        out = np.ascontiguousarray(full[:, :3, :, :3]).reshape(3 * k, 3 * k)
-        couple = self.still[rod][:, None] * full[:, 3, :, :3].reshape(k, 3 * k)
-        turned = solve_banded((1, 1), self.turns[:, rod], couple, check_finite=False)
-        return out + full[:, :3, :, 3].reshape(3 * k, k) @ turned
+    def system(self, rod: slice, mobility: np.ndarray, tau: float) -> np.ndarray:
+        """The transpose of 1 - tau M K (c k, c k) for one filament's k nodes, or for all, with M (c k, c k) symmetric.
+
+        Columns of held unknowns are those of -tau M in it: there forces are sought. c unknowns a node go through the
+        fluid.
+        """
+        size, k = len(mobility), rod.stop - rod.start
+        out = banded.transposed_product(self.band[rod], mobility, -tau)
+        if self.turns is not None and self.still is not None:
+            couple = self.still[rod][:, None] * banded.dense(self.band[rod])[:, 3, :, :3].reshape(k, size)
+            turned = solve_banded((1, 1), self.turns[:, rod], couple, check_finite=False)
+            out = out[:, :3].reshape(size, size) + turned.T @ out[:, 3]
+        out = out.reshape(size, size)
+        out.ravel()[:: size + 1] += 1.0
+        c = size // k
+        held = self.held[(self.held >= c * rod.start) & (self.held < c * rod.stop)] - c * rod.start
+        out[held] = -tau * mobility[held]
+        return out
 
 
 class Reduced(Protocol):

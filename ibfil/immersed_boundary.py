@@ -177,7 +177,7 @@ class ImmersedResponse(ABC):
         index = statement.index
         known = np.zeros(statement.force.size)
         known[index] = statement.value
-        push = statement.force + statement.times(known)
+        push = statement.force + statement.times(known) if index.size else statement.force
         right = self._base(target) - y[:, :c].ravel() + self.tau * self.apply(push) - known
         x = self.solve(statement, right)
         d, reaction = x.copy(), np.zeros(force.shape)

@@ -18,42 +18,29 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
 _CYCLE = 60  # vectors GMRES keeps
-_BLOCK = 96  # columns of a product at a time
 _DRIFT = 0.4  # of tau, by which a kept preconditioner may be off: less than the change from Euler to BDF2
 _TRIAL = 8  # preconditioners, of which one is kept for longer than the others were worth it
 
 Product = Callable[[np.ndarray], np.ndarray]
 
 
-def dense_system(matrix: np.ndarray, stiffness: np.ndarray, tau: float, index: np.ndarray) -> np.ndarray:
-    """1 - tau M K with the columns of held unknowns replaced by those of -tau M; K may have any band."""
-    n = len(matrix)
-    system = np.empty((n, n)) if n > 2 * _BLOCK else matrix @ stiffness
-    for first in range(0, n if n > 2 * _BLOCK else 0, _BLOCK):
-        columns = slice(first, first + _BLOCK)
-        rows = np.flatnonzero(stiffness[:, columns].any(axis=1))
-        some = slice(rows[0], rows[-1] + 1) if rows.size else slice(0, 0)
-        np.matmul(matrix[:, some], stiffness[some, columns], out=system[:, columns])
-    system *= -tau
-    system.ravel()[:: n + 1] += 1.0
-    system[:, index] = -tau * matrix[:, index]
-    return system
-
-
 class Factors(NamedTuple):
-    """LU factors, with pivots, of the transpose of a system: rows of C are columns of LAPACK, so nothing is copied."""
+    """LU factors, with pivots, of a system."""
 
     lu: np.ndarray
     pivots: np.ndarray
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """x with system x = right."""
-        return dgetrs(self.lu, self.pivots, right, trans=1)[0]
+        return dgetrs(self.lu, self.pivots, right)[0]
 
 
-def factor(system: np.ndarray) -> Factors:
-    """The factors of ``system`` (n, n), which is overwritten. Raises numpy.linalg.LinAlgError where it is singular."""
-    lu, pivots, fault = dgetrf(system.T, overwrite_a=True)
+def factor(transposed: np.ndarray) -> Factors:
+    """The factors of a system (n, n) from its transpose, which is overwritten: LAPACK takes rows for columns.
+
+    Raises numpy.linalg.LinAlgError where it is singular.
+    """
+    lu, pivots, fault = dgetrf(transposed.T, overwrite_a=True)
     if fault:
         raise np.linalg.LinAlgError("Singular matrix")
     return Factors(lu, pivots)
@@ -78,7 +65,7 @@ class Blocks(NamedTuple):
 
 
 def factored(parts: list[tuple[slice, np.ndarray]], held: np.ndarray) -> Blocks:
-    """The factors of square blocks, by the range of unknowns each stands for; overwrites them."""
+    """The factors of square blocks, by the range of unknowns each stands for, given transposed; overwrites them."""
     diagonal = np.concatenate([np.diag(system) for _, system in parts])
     scale = np.ones(len(diagonal))
     scale[held] = 1.0 / diagonal[held]

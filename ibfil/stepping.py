@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numba import njit
 
 from .fluid import Answer, Fluid, Held, Response
 from .geometry import Geometry
@@ -83,9 +84,16 @@ class Stepper(Protocol):
         """From ``state`` to ``state.time + dt``. Raises NotConverged."""
 
 
-def _size(move: np.ndarray, length: float) -> float:
-    """The largest displacement in units of the length, or turn in radians."""
-    return float(max(np.max(np.abs(move[:, :3])) / length, np.max(np.abs(move[:, 3:]), initial=0.0)))
+@njit(cache=True)
+def _size(move, length):
+    """The largest displacement in units of the length, or turn in radians; no number where one of them is none."""
+    largest = 0.0
+    for i in range(move.shape[0]):
+        for c in range(move.shape[1]):
+            size = abs(move[i, c]) / (length if c < 3 else 1.0)
+            if size > largest or size != size:
+                largest = size
+    return largest
 
 
 def _finish(

@@ -10,6 +10,7 @@ krylov   either FFT, for many nodes: the preconditioner is the exact matrix rod 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -80,10 +81,16 @@ class _Dense(ImmersedResponse):
     keeps = True
 
     def __init__(
-        self, fluid: Immersed, matrix: np.ndarray, r: np.ndarray, e3: np.ndarray, time: float, tau: float
+        self,
+        fluid: Immersed,
+        matrix: Callable[[Nodes], np.ndarray],
+        r: np.ndarray,
+        e3: np.ndarray,
+        time: float,
+        tau: float,
     ) -> None:
         super().__init__(fluid, r, e3, time, tau)
-        self.matrix = matrix
+        self.matrix = matrix(self.nodes)
         self._factors: tuple[np.ndarray, krylov.Factors] | None = None  # and the stiffness they are of
 
     def apply(self, force: np.ndarray) -> np.ndarray:
@@ -95,8 +102,7 @@ class _Dense(ImmersedResponse):
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         rods = statement.frozen()
         if self._factors is None or self._factors[0] is not rods.band:
-            stiffness = rods.matrix(slice(0, len(self.nodes.axes)))
-            system = krylov.dense_system(self.matrix, stiffness, self.tau, statement.index)
+            system = rods.system(slice(0, len(self.nodes.axes)), self.matrix, self.tau)
             self._factors = rods.band, krylov.factor(system)
         return self._factors[1].solve(right)
 
@@ -138,8 +144,7 @@ class StokesByTable(Tabulated):
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Dense:
         """The mobility of nodes r (n, 3) with tangents e3 (n, 3)."""
-        fluid = self.fluid
-        return _Dense(fluid, self.matrix(fluid.nodes(r, e3), fluid.own), r, e3, time, tau)
+        return _Dense(self.fluid, lambda nodes: self.matrix(nodes, self.fluid.own), r, e3, time, tau)
 
 
 class StokesByAverage(Tabulated):
@@ -153,7 +158,7 @@ class StokesByAverage(Tabulated):
         """The averaged mobility of nodes r (n, 3)."""
         fluid, n = self.fluid, len(r)
         matrix = mobility_averaged.mobility(self._averaged, fluid.grid.cells, fluid.grid.coordinates(r), fluid.slip)
-        return _Dense(fluid, matrix.reshape(3 * n, 3 * n), r, e3, time, tau)
+        return _Dense(fluid, lambda nodes: matrix.reshape(3 * n, 3 * n), r, e3, time, tau)
 
 
 class _Fourier(ImmersedResponse):
@@ -214,9 +219,7 @@ class StokesByFFT(Tabulated):
         parts, c = [], self.fluid.coupling.parts
         for rod in ranges:
             matrix = self.matrix(nodes[rod], self.fluid.own[rod])
-            at = slice(c * rod.start, c * rod.stop)
-            held = rods.held[(rods.held >= at.start) & (rods.held < at.stop)] - at.start
-            parts.append((at, krylov.dense_system(matrix, rods.matrix(rod), tau, held)))
+            parts.append((slice(c * rod.start, c * rod.stop), rods.system(rod, matrix, tau)))
         return krylov.factored(parts, rods.held)
 
 

@@ -58,6 +58,18 @@ def assert_solved(matrix: np.ndarray, right: np.ndarray, where: banded.Profile) 
 
 
 @ANY_SCENE
+@pytest.mark.parametrize(("m", "through"), [(3, 3), (4, 3), (4, 4)])
+def test_transposed_products_are_those_of_the_full_matrix(parts: list[Segmented], m: int, through: int) -> None:
+    matrix, _ = stiffness(parts, m)
+    matrix = randomly(matrix, 5)
+    n = len(matrix)
+    full = np.random.default_rng(2).standard_normal((n, through, 2 * n + 1))
+    exact = np.einsum("iajb,ial->jbl", banded.dense(matrix)[:, :through], full)
+    found = banded.transposed_product(matrix, full.reshape(through * n, -1), -0.3)
+    assert np.abs(found + 0.3 * exact).max() < 1e-13 * np.abs(exact).max()
+
+
+@ANY_SCENE
 @ANY_UNKNOWNS
 def test_products_are_those_of_the_full_matrix(parts: list[Segmented], m: int) -> None:
     matrix, _ = stiffness(parts, m)

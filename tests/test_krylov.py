@@ -7,7 +7,9 @@ from scenes import swimmer
 from ibfil import krylov
 from ibfil.budget import memory
 from ibfil.case import parse_case
+from ibfil.condensation import Newton, NothingCondensed, TwistCondensed
 from ibfil.errors import CaseError
+from ibfil.fluid import Held
 from ibfil.simulation import Simulation
 
 MANY = """
@@ -153,15 +155,36 @@ def test_a_stiff_rod_of_many_nodes_is_not_given_up_for_rounding():
         assert np.abs(paths[method] - paths["table"]).max() < 1e-8
 
 
-def test_a_dense_system_takes_a_band_as_it_takes_a_full_matrix():
-    rng, n = np.random.default_rng(1), 240
-    full, matrix, held = rng.standard_normal((n, n)), rng.standard_normal((n, n)), np.array([3, 200])
-    band = np.triu(np.tril(full, 20), -20)
-    for stiffness in (full, band, np.zeros((n, n))):
-        system = krylov.dense_system(matrix, stiffness, 0.3, held)
-        expected = np.eye(n) - 0.3 * matrix @ stiffness
-        expected[:, held] = -0.3 * matrix[:, held]
-        assert np.allclose(system, expected, rtol=0, atol=1e-12)
+@pytest.mark.parametrize(
+    ("unknowns", "condensation"),
+    [(3, NothingCondensed()), (4, NothingCondensed()), (4, TwistCondensed(np.linspace(1.0, 2.0, 24)))],
+    ids=["plain", "twist on the grid", "twist condensed"],
+)
+def test_the_system_of_rods_is_their_statement(unknowns, condensation):
+    """1 - tau M K by its matrix, and by the products that the FFTs are given; two rods, and each of them alone."""
+    rng, n, tau = np.random.default_rng(1), 24, 0.3
+    rods = slice(0, 14), slice(14, n)
+    band = rng.standard_normal((n, unknowns, 7 * unknowns))
+    for i, a in np.ndindex(n, 7):
+        if not any(rod.start <= i < rod.stop and rod.start <= i + a - 3 < rod.stop for rod in rods):
+            band[i, :, a * unknowns : (a + 1) * unknowns] = 0.0
+    parts = np.array([0, 2, 5 * unknowns + 1, 15 * unknowns + unknowns - 1, 20 * unknowns])
+    zero = np.zeros((n, unknowns))
+    statement = condensation.reduced(Newton(zero, band, Held(parts, np.zeros(5)), zero, zero, tau))
+    c = statement.force.size // n
+    for rod in (slice(0, n), *rods):
+        within = slice(c * rod.start, c * rod.stop)
+        mobility = np.zeros((c * n, c * n))
+        half = rng.standard_normal((c * (rod.stop - rod.start),) * 2)
+        mobility[within, within] = half + half.T
+        x = np.zeros(c * n)
+        x[within] = rng.standard_normal(within.stop - within.start)
+        pushed = statement.times(statement.free * x)
+        pushed[statement.index] += x[statement.index]
+        expected = (statement.free * x - tau * mobility @ pushed)[within]
+        system = statement.frozen().system(rod, np.ascontiguousarray(mobility[within, within]), tau)
+        assert np.allclose(system.T @ x[within], expected, rtol=0, atol=1e-10)
+        assert np.allclose(krylov.factor(system.copy()).solve(expected), x[within], rtol=0, atol=1e-8)
 
 
 def _rounds(kept, products):
