@@ -43,7 +43,7 @@ def limited(path: Path, size: int) -> subprocess.CompletedProcess:
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
     command = [sys.executable, "-c", code]
-    return subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, timeout=120, check=False)
+    return subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, timeout=300, check=False)
 
 
 @pytest.mark.parametrize("size", [400_000, 500_000])

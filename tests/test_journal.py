@@ -201,7 +201,7 @@ def test_a_limit_of_the_system_is_a_failure_and_no_crash(path):
         [sys.executable, "-c", script, str(path), str(here), str(here.parent)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     assert "run.h5 cannot be written (File too large)" in done.stdout

@@ -200,7 +200,7 @@ def test_two_writers_on_one_file_are_refused(path):
         with RunFile(path) as run:  # but reading is free
             assert run.status == "running"
     finally:
-        other.communicate(timeout=30)
+        other.communicate(timeout=300)
     with RunFile(path) as run:
         assert run.status == "cut"  # it never said how it ended
     begin(path, next(frames(1)), overwrite=True).close()

@@ -209,6 +209,6 @@ def test_there_is_no_flow_under_rft(tmp_path):
 @draws
 def test_the_command_draws(run, tmp_path):
     command = [sys.executable, "-m", "ibfil", "render", run, "-o", "a.png", "--size", "320x240", "--colour", "speed"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "a.png\n", "")
     assert (tmp_path / "a.png").is_file()

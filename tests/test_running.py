@@ -101,7 +101,7 @@ def test_a_run_loads_no_pictures():
         "ibfil.running.run(fake_simulation.case(), build=fake_simulation.FakeSimulation, log=id)\n"
         "print([name for name in ('pyvista', 'vtk', 'vtkmodules', 'matplotlib') if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code, HERE, HERE.parent], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code, HERE, HERE.parent], capture_output=True, text=True, timeout=300)
     assert done.stdout == "[]\n", done.stderr
 
 

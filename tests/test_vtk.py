@@ -279,7 +279,7 @@ Show(tubes, view), Show(lines, view)
 SaveScreenshot({str(tmp_path / "look.png")!r}, view)
 """
     )
-    done = subprocess.run([*pvpython(), script], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([*pvpython(), script], capture_output=True, text=True, timeout=300)
     told = dict(line.split(" ", 1) for line in done.stdout.splitlines() if " " in line)
     assert told["times"] == "0.0 0.25 0.5 0.75 1.0", done.stderr
     assert eval(told["y"]) == (2.25, 2.25)  # SPEED * 0.75
@@ -293,7 +293,7 @@ SaveScreenshot({str(tmp_path / "look.png")!r}, view)
 def test_the_ready_scene_opens_in_paraview(collection, tmp_path):
     scene = collection.with_name("made_paraview.py")
     picture = tmp_path / "scene.png"
-    done = subprocess.run([*pvpython(), scene, picture], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([*pvpython(), scene, picture], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "rror" not in done.stderr
     pixels = pyvista.read(picture)["PNGImage"].reshape(960, 1280, -1)[..., :3]
