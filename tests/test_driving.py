@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import RFT, scene
+from scipy.optimize import brentq
 
+from ibfil import timescales
 from ibfil.check import modelled, report
 from ibfil.simulation import Simulation
 
@@ -116,3 +118,20 @@ def test_the_report_names_every_load_and_law() -> None:
     assert full.endswith(words + "internal moment, weight, tethers")
     assert bare.endswith("stretching, twisting, start free, finish free")
     assert flow.startswith("a background flow")
+
+
+@pytest.mark.parametrize(
+    ("start", "finish", "zero", "near"),
+    [
+        ("free", "free", lambda b: np.cos(b) - 1 / np.cosh(b), 4.7),
+        ("clamped", "clamped", lambda b: np.cos(b) - 1 / np.cosh(b), 4.7),
+        ("clamped", "free", lambda b: np.cos(b) + 1 / np.cosh(b), 1.9),
+        ("free", "hinged", lambda b: np.tan(b) - np.tanh(b), 3.9),
+        ("hinged", "clamped", lambda b: np.tan(b) - np.tanh(b), 3.9),
+        ("hinged", "hinged", np.sin, 3.1),
+    ],
+)
+def test_the_slowest_bending_time_is_that_of_the_beams_first_mode(start, finish, zero, near):
+    """zeta L^4/(A beta^4), beta the first root of the beam's characteristic equation but those of rigid motions."""
+    beta = brentq(zero, near - 0.2, near + 0.2, xtol=1e-14)
+    assert timescales.bending_time(3.0, 2.0, 5.0, start, finish) == pytest.approx(3 * 16 / (5 * beta**4), rel=1e-5)
