@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_run import CELLS, ORIGIN, SPACING, flow, make_run
+from scenes import slopes
 
 import ibfil
 from ibfil.errors import CaseError
+from ibfil.kernels import KERNELS
 
 PROBES = [[0.1, 0.31, 0.05], [0.93, -0.2, 0.0], [-0.4, 0.02, -0.77]]
 BENT = f"""
@@ -58,19 +60,23 @@ def test_the_flow_is_that_of_the_probes(bent):
         assert np.array_equal(run.velocity_at(PROBES), run.velocity_at(PROBES, run.time[-1]))
 
 
-def test_a_node_moves_with_the_flow_there_but_for_its_slip(bent):
-    """Without slip, u at a node is its own velocity: here slip is 1 % of its own mobility times its force."""
-    with ibfil.open(bent) as run:
-        rod = run.filaments["rod_001"]
-        found = run.velocity_at(rod["position"][-1])
-        from ibfil.kernels import KERNELS
+def test_a_node_moves_with_the_flow_there_but_for_its_slip(tmp_path):
+    """Without slip, u at a node is its own velocity: here slip is 1 % of its own mobility times its force.
 
-        h, ds = 0.1, 1 / 16
-        slip = 0.01 * (h / (2 * ds)) / (6 * np.pi * 0.7 * KERNELS["peskin4"].point_radius * h)
-        # The step's own velocity is that of the step's end to first order in the step.
-        np.testing.assert_allclose(
-            rod["velocity"][-1], found + slip * rod["force"][-1], atol=0.02 * np.abs(found).max()
-        )
+    The velocity that a step has is by the mobility where it was going, and the flow asked for by that of where it came
+    to: they differ by second order in the step.
+    """
+    h, ds, left = 0.1, 1 / 16, []
+    slip = 0.01 * (h / (2 * ds)) / (6 * np.pi * 0.7 * KERNELS["peskin4"].point_radius * h)
+    for step in (2e-3, 1e-3, 5e-4):
+        path = tmp_path / "run.h5"
+        case = ibfil.parse_case(BENT, "bent.toml", [f"time.step={step}"])
+        ibfil.run(case, path, overwrite=True, log=lambda line: None)
+        with ibfil.open(path) as run:
+            rod = run.filaments["rod_001"]
+            found = run.velocity_at(rod["position"][-1])
+            left.append(float(np.abs(rod["velocity"][-1] - slip * rod["force"][-1] - found).max()))
+    assert min(slopes(left)) > 1.9
 
 
 def test_the_flow_between_two_outputs_lies_between(bent):
