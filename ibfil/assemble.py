@@ -44,13 +44,6 @@ class Stacked:
     start: Geometry
     contact: Contact | None
 
-    @property
-    def spacing(self) -> np.ndarray:
-        """Distance between nodes about each node (n,): its control volume, twice that at an end."""
-        mesh = self.mechanics.mesh
-        ends = ~mesh.joined | ~np.append(False, mesh.joined[:-1])
-        return np.where(ends, 2.0, 1.0) * mesh.volume
-
 
 def _turn(end) -> Turn | None:
     """How e1 turns at a held end; None where it is free."""

@@ -98,7 +98,8 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
 
     assert case.fluid.box is not None
     grid, eta = Grid(case.fluid.box, case.fluid.cells or assemble_grid.cells_of_thickness(case)), case.fluid.viscosity
-    slip = immersed_boundary.slip_mobility(case.fluid.slip, assemble_grid.kernel(case), grid, eta, stacked.spacing)
+    volume = stacked.mechanics.mesh.volume
+    slip = immersed_boundary.slip_mobility(case.fluid.slip, assemble_grid.kernel(case), grid, eta, volume)
     against = stacked.mechanics.unknowns == 4 and not assemble_grid.couples_torque(case)
     spin = drag(case, stacked).spin if against else None
     number = np.float32 if case.fluid.precision == "single" else np.float64

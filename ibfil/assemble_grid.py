@@ -92,5 +92,6 @@ def own_mobility(case: Case, stacked: Stacked, grid: Grid) -> np.ndarray:
     """What each node moves by its own force or torque beyond the grid's answer, (n, c): slip, and spin below h."""
     from . import immersed_boundary
 
-    slip = immersed_boundary.slip_mobility(case.fluid.slip, kernel(case), grid, case.fluid.viscosity, stacked.spacing)
+    volume = stacked.mechanics.mesh.volume
+    slip = immersed_boundary.slip_mobility(case.fluid.slip, kernel(case), grid, case.fluid.viscosity, volume)
     return coupling(case, stacked).own(slip)

@@ -96,8 +96,7 @@ def measure(rod: Rod) -> Match:
     """The drag of the rod, measured. Raises ValueError where its nodes' mobility is singular."""
     grid, kernel = Grid(rod.box, rod.cells), KERNELS[rod.kernel]
     table = mobility.octant(mobility.point_response(grid, 1.0), kernel.points)
-    ds = np.full(rod.nodes, rod.length / (rod.nodes - 1))
-    slip = slip_mobility(rod.slip, kernel, grid, 1.0, ds)
+    slip = slip_mobility(rod.slip, kernel, grid, 1.0, _volume(rod))
     s = np.linspace(-0.5 * rod.length, 0.5 * rod.length, rod.nodes)[:, None]
     drags, weights = [], []
     for weight, frame in directions():
@@ -112,11 +111,16 @@ def measure(rod: Rod) -> Match:
     return Match(across, along, across_scatter, along_scatter, *(_spin(rod, grid) if rod.radius else (0.0, 0.0)))
 
 
+def _volume(rod: Rod) -> np.ndarray:
+    """The nodes' control volumes (n,), half as large at the ends."""
+    volume = np.full(rod.nodes, rod.length / (rod.nodes - 1))
+    volume[[0, -1]] *= 0.5
+    return volume
+
+
 def _spin(rod: Rod, grid: Grid) -> tuple[float, float]:
     """The drag against spin, from torques that turn all nodes at unit rate (torque_coupling.py), and its scatter."""
-    kernel, ds = KERNELS[rod.kernel], rod.length / (rod.nodes - 1)
-    volume = np.full(rod.nodes, ds)
-    volume[[0, -1]] *= 0.5
+    kernel, volume = KERNELS[rod.kernel], _volume(rod)
     own = np.zeros((rod.nodes, 4))
     widest = kernel.twist_radius * grid.spacing / math.sqrt(1.0 + rod.slip)
     own[:, 3] = torque_coupling.spin_mobility(np.full(rod.nodes, rod.radius), widest, rod.slip, 1.0, volume)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import CaseError, Interrupted, RunFailed
 from .study import Axis, Setting, combinations, measured, source, study_members, write_csv, write_json
 from .study_members import Member, Outcome, run_members
-from .trade_reference import POSITION, Reference, distances, prove
+from .trade_reference import NOMINAL, POSITION, Reference, distances, prove
 
 if TYPE_CHECKING:
     from .case import Case
@@ -141,7 +141,7 @@ def _proved(reference: Reference, asked: Sequence[str], say: Say) -> tuple[str, 
     for name in asked:
         for proof in reference.proofs[name]:
             say(
-                f"reference, {name} in {proof.direction}: order {proof.order:.2f} (nominal {proof.nominal:g}), "
+                f"reference, {name} in {proof.direction}: order {proof.order:.2f} (nominal {NOMINAL:g}), "
                 f"error left {proof.estimate:.2g}"
             )
     for name in reference.refused:

@@ -9,8 +9,8 @@ d2/(2^p - 1), p the observed order or the nominal one, whichever is less.
 The reference has the finest step; and the finest nodes where nodes are varied. Where they are not, it has the case's,
 and what the refinement shows is what the nodes themselves cost: `Reference.of_nodes`.
 
-The grid is no level: its cells are the thickness of the rod (numerics.md, section 4). On a grid the order in nodes is
-1 at best: the force density of a line is not smooth at its ends, and with little slip the layers are thin.
+The grid is no level: its cells are the thickness of the rod (numerics.md, section 4). With little slip the force
+density has thin layers at the ends, and second order in nodes shows only where they are well below h apart.
 """
 
 from __future__ import annotations
@@ -31,8 +31,7 @@ from .study_members import Member, Outcome
 if TYPE_CHECKING:
     from .case import Case
 
-IN_TIME = 2.0  # nominal order of BDF2
-IN_SPACE = {True: 2.0, False: 1.0}  # of the finite volumes in rft, ends included; of a line in a grid
+NOMINAL = 2.0  # order of BDF2 in time, and of the finite volumes in space, ends included
 ENOUGH = 0.7  # of the nominal order
 MORE = 1  # further levels, where the order is not seen
 ROUND_OFF = 1e-10  # a distance that no refinement needs to lessen
@@ -49,13 +48,12 @@ class Proof:
     levels: tuple[str, ...]
     distances: tuple[float, float]
     order: float
-    nominal: float
     estimate: float  # of the error left in the finest level
 
     @property
     def holds(self) -> bool:
         """Whether the observed order is near enough to the nominal one."""
-        return self.distances[1] <= ROUND_OFF or self.order >= ENOUGH * self.nominal
+        return self.distances[1] <= ROUND_OFF or self.order >= ENOUGH * NOMINAL
 
 
 @dataclass(frozen=True)
@@ -113,8 +111,7 @@ class Levels:
         exact: tuple[str, ...] = ("time.scheme=implicit", "time.order=2")
         given = Member("reference", self._source, (*overrides, *exact)).resolved()
         _refuse(given)
-        self.local = given.fluid.model == "rft"
-        if not self.local:
+        if given.fluid.model != "rft":
             exact += ("fluid.method=auto", "fluid.precision=double")
         self._overrides = (*overrides, *exact)
         automatic = Member("reference", self._source, (*self._overrides, "time.step=auto")).resolved()
@@ -154,7 +151,6 @@ def _refuse(case: Case) -> None:
 
 def _refine(levels: Levels, direction: str, measures: Sequence[str], more: int) -> tuple[int, dict[str, Proof]]:
     """Refine until every measure shows its order, or ``more`` times; the finest level and the proofs."""
-    nominal = IN_TIME if direction == "time" else IN_SPACE[levels.local]
     for first in range(more + 1):
         at = [(k, 0) if direction == "time" else (0, k) for k in range(first, first + 3)]
         paths = levels.paths(at)
@@ -164,9 +160,9 @@ def _refine(levels: Levels, direction: str, measures: Sequence[str], more: int) 
         for name in measures:
             d = (before[name], after[name])
             order = float(np.log2(d[0] / d[1])) if d[0] > 0 and d[1] > 0 else float("inf")
-            certain = max(min(order, nominal), 0.1)  # an estimate is wanted also where there is no order
+            certain = max(min(order, NOMINAL), 0.1)  # an estimate is wanted also where there is no order
             names = tuple(levels.member(*level).name for level in at)
-            proofs[name] = Proof(direction, names, d, order, nominal, d[1] / (2**certain - 1))
+            proofs[name] = Proof(direction, names, d, order, d[1] / (2**certain - 1))
         if all(proof.holds for proof in proofs.values()):
             break
     return first + 2, proofs

@@ -72,14 +72,14 @@ def test_scatter_is_what_places_and_directions_differ_by():
     """The mean and the deviation again, rod by rod, through forces that give the nodes one velocity."""
     grid, kernel = Grid(SMALL.box, SMALL.cells), KERNELS[SMALL.kernel]
     table = matched_drag.mobility.octant(matched_drag.mobility.point_response(grid, 1.0), kernel.points)
-    ds = SMALL.length / (SMALL.nodes - 1)
-    slip = SMALL.slip * (grid.spacing / (2 * ds)) / (6 * np.pi * kernel.point_radius * grid.spacing)
+    volume = SMALL.length / (SMALL.nodes - 1) * np.array([0.5, *[1.0] * (SMALL.nodes - 2), 0.5])
+    slip = SMALL.slip * (grid.spacing / (2 * volume)) / (6 * np.pi * kernel.point_radius * grid.spacing)
     along, across, weights = [], [], []
     for weight, (t, n, b) in directions():
         for place in places(8):
             r = np.linspace(-0.25, 0.25, 11)[:, None] * t + place * grid.spacing
             stencil = kernel.stencil(grid.coordinates(r))
-            m = matched_drag.mobility.mobility(table, grid.cells, *stencil, np.full(11, slip))
+            m = matched_drag.mobility.mobility(table, grid.cells, *stencil, slip)
             m = m.reshape(33, 33)
             along.append(np.tile(t, 11) @ np.linalg.solve(m, np.tile(t, 11)) / 0.5)
             across += [np.tile(u, 11) @ np.linalg.solve(m, np.tile(u, 11)) / 0.5 for u in (n, b)]
