@@ -40,7 +40,7 @@ class Answer(NamedTuple):
 class Response(Protocol):
     """A fluid at frozen positions, over a step whose effective length is tau (units of time).
 
-    ``keeps``: ``implicit`` leaves its matrix as it is, and given the same object again it has what it made of it.
+    ``keeps``: ``implicit`` does not overwrite the stiffness, and given the same array again uses its factors again.
     """
 
     keeps: bool

@@ -125,9 +125,9 @@ class ControlledSteps:
         BDF2   dt^3 (1 + w)^2/(6 w (1 + 2 w)) |r'''|,  r''' = 6 [r_{n+1}, r_n, r_{n-1}, r_{n-2}]
         Euler  dt^2/2 |r''|,                           r''  = 2 [r_{n+1}, r_n, r_{n-1}]
 
-    Where the past for a difference is missing, after a start, it is the lower one times the scene's own rate. A step
-    much shorter than anything the scene drives may err as much as one of that length: the few steps through a stiff
-    start, where the nodes settle by a millionth of the length, need not be resolved to a fraction of that.
+    Where the past for a difference is missing, after a start, the difference below it times the scene's own rate takes
+    its place. Steps shorter than a hundredth of the scene's own time may each err as much as one of that length: so
+    the few short steps through a stiff start, where nodes settle by a millionth of the length, are not refined for it.
 
     A step whose error is above tolerance times dt is rejected, the whole of it, and repeated shorter. Steps are held:
     equal parts of the time to the next output, until one HELD times as long would do (codes for stiff equations do so:

@@ -140,7 +140,8 @@ class Mechanics:
     def _levers(self, shape: Geometry) -> np.ndarray:
         """The forces (n, 2, m) that a unit M3 at each half node gives the nodes before and after it.
 
-        The force is linear in M3 and M3 reaches the two nodes beside it, so every other half node is tried at once.
+        The force is linear in M3, and each M3 acts on the two nodes beside its half node only: so a unit M3 on every
+        other half node, and then on the rest, gives them all.
         """
         n = len(shape.r)
         none = Moment(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n))

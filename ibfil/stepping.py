@@ -1,4 +1,4 @@
-"""Time steps. They know rods and the contract of fluids, and no fluid.
+"""Time steps: Euler (explicit, linearly implicit, implicit) and BDF2. They know the contract of fluids, and no fluid.
 
 Over a step every scheme is y = target + tau (u0 + M (f(y) + R)) for the displacements y since its start, with M frozen:
     Euler   target = 0,                             tau = dt
@@ -171,13 +171,14 @@ def _stride(move: np.ndarray, shape: Geometry) -> float:
 class Implicit:
     """Backward Euler (order 1) or variable-step BDF2 (order 2): Newton on the force, M frozen where the rods will be.
 
-    M is taken at the extrapolated positions. It begins there, and goes on while corrections shrink fast; a matrix
-    serves again where the fluid keeps its factors and corrections shrink by ``again``.
+    M is taken at the extrapolated positions. Newton's iteration is tried from three starts, until one converges:
 
-    Where that fails it begins at the start of the step: the first iteration leaves compressive geometric stiffness out
-    of the matrix, and so does any that makes the correction grow. Where that fails too, as on soft rods of many nodes,
-    whose ends move by more than a segment in a step, it goes a third time: from the extrapolated positions, with
-    corrections cut to what changes no segment by more than ``stride`` of itself.
+    1. from the extrapolated positions, for as long as corrections shrink fast; the matrix of the iteration before
+       serves again where the fluid keeps its factors and the last correction shrank by ``again``;
+    2. from the start of the step, compressive geometric stiffness left out of the matrix in the first iteration, and
+       in any whose correction would be four times the last one without that;
+    3. as 2, but from the extrapolated positions and with corrections cut so that no segment changes by more than
+       ``stride`` of itself: soft rods of many nodes, whose ends move by more than a segment in a step, need it.
     """
 
     order: int = 2
