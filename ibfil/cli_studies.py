@@ -167,7 +167,7 @@ def _trade(arguments: argparse.Namespace) -> int:
         say=_say,
     )
     _print_table(trade.rows(made), ("message",))
-    print(f"{folder / trade.TABLE}, {trade.TOLD}, {trade.FIGURE}")
+    print(f"{folder / trade.TABLE}, {trade.DETAILS}, {trade.FIGURE}")
     if arguments.wanted is None:
         return 0
     best = made.cheapest(arguments.wanted)
@@ -207,7 +207,7 @@ def _compare(arguments: argparse.Namespace) -> int:
         say=_say,
     )
     _print_comparison(made)
-    print(f"{folder / compare.TABLE}, {compare.TOLD}, {compare.FIGURE}")
+    print(f"{folder / compare.TABLE}, {compare.DETAILS}, {compare.FIGURE}")
     return 0 if all(column.outcome.done for column in made.columns) else 1
 
 
@@ -249,5 +249,5 @@ def _stability(arguments: argparse.Namespace) -> int:
         "turn, rad; stretch; force, ratio"
     )
     print(f"{made.foretold} of {len(made.cells)} as predicted")
-    print(f"{folder / stability.TABLE}, {stability.TOLD}, {stability.FIGURE}")
+    print(f"{folder / stability.TABLE}, {stability.DETAILS}, {stability.FIGURE}")
     return 0

@@ -25,7 +25,7 @@ from .study_members import Member, Outcome, run_members
 if TYPE_CHECKING:
     from .case import Case
 
-TABLE, TOLD, FIGURE = "compare.csv", "compare.json", "compare.png"
+TABLE, DETAILS, FIGURE = "compare.csv", "compare.json", "compare.png"
 BLOCKS = 4  # parts of the second half of a run that nothing drives in time
 _SLACK = 1e-3  # of a period: what it may be wrong by, found by sampling what drives
 _TRANSIENT = 1 / 3  # of a run, at least, and a whole period
@@ -211,7 +211,7 @@ def rows(made: Comparison) -> list[dict[str, Any]]:
     return out
 
 
-def told(made: Comparison) -> dict[str, Any]:
+def details(made: Comparison) -> dict[str, Any]:
     """Return everything, ready for JSON."""
     return {
         "title": made.title,
@@ -237,5 +237,5 @@ def _write(made: Comparison, folder: Path, runs: Mapping[str, RunFile]) -> None:
     from .compare_figure import draw
 
     write_csv(folder / TABLE, rows(made))
-    write_json(folder / TOLD, told(made))
+    write_json(folder / DETAILS, details(made))
     draw(made, runs, folder / FIGURE)

@@ -32,7 +32,7 @@ from .study_members import Member, Outcome, run_members
 if TYPE_CHECKING:
     from .record import RunFile
 
-TABLE, TOLD, FIGURE = "stability.csv", "stability.json", "stability.png"
+TABLE, DETAILS, FIGURE = "stability.csv", "stability.json", "stability.png"
 STRETCH, LOCKED, TURN, PLACE = 0.02, 10.0, 0.1, 0.05
 FINER, SLIP = 4, 0.01
 CLASSES = ("stable", "wrong", "turned", "locked", "stretched", "diverged", "no reference")
@@ -226,5 +226,5 @@ def _write(made: Map, folder: Path) -> None:
 
     write_csv(folder / TABLE, rows(made))
     limits = {"stretch": STRETCH, "force": LOCKED, "turn": TURN, "place": PLACE}
-    write_json(folder / TOLD, {"title": made.title, **made.about, "limits": limits, "cells": rows(made)})
+    write_json(folder / DETAILS, {"title": made.title, **made.about, "limits": limits, "cells": rows(made)})
     draw(made, folder / FIGURE)

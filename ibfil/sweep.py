@@ -12,7 +12,7 @@ from .errors import CaseError
 from .study import Axis, Setting, combinations, measured, numbers, study_members, write_csv, write_json
 from .study_members import Outcome, run_members, work
 
-TABLE, TOLD = "sweep.csv", "sweep.json"
+TABLE, DETAILS = "sweep.csv", "sweep.json"
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def sweep(
     rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
     table = [row.row() for row in rows]
     write_csv(Path(folder) / TABLE, table)
-    write_json(Path(folder) / TOLD, {**measured(), "overrides": list(overrides), "runs": table})
+    write_json(Path(folder) / DETAILS, {**measured(), "overrides": list(overrides), "runs": table})
     return rows
 
 

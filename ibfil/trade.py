@@ -27,7 +27,7 @@ from .trade_reference import NOMINAL, POSITION, Reference, distances, prove
 if TYPE_CHECKING:
     from .case import Case
 
-TABLE, TOLD, FIGURE = "trade.csv", "trade.json", "trade.png"
+TABLE, DETAILS, FIGURE = "trade.csv", "trade.json", "trade.png"
 CLOCKS = ("wall", "processor")
 _SPACE = ("nodes", "spacing")  # keys that change the nodes
 
@@ -262,7 +262,7 @@ def rows(made: Trade) -> list[dict[str, Any]]:
     return out
 
 
-def told(made: Trade) -> dict[str, Any]:
+def details(made: Trade) -> dict[str, Any]:
     """Return everything, ready for JSON."""
     reference = made.reference
     return {
@@ -295,5 +295,5 @@ def _write(made: Trade, folder: Path) -> None:
     from .trade_figure import draw
 
     write_csv(folder / TABLE, rows(made))
-    write_json(folder / TOLD, told(made))
+    write_json(folder / DETAILS, details(made))
     draw(made, folder / FIGURE)
