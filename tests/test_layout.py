@@ -28,6 +28,7 @@ RODS = {"mesh", "geometry", "directors", "elasticity", "laws", "ends", "loads", 
 RESULTS = {"record", "recorder", "checkpoint", "journal", "observe", *with_prefix("observables"), "expectations"}
 PICTURES = {"analysis", *with_prefix("vtk"), *with_prefix("render")}
 LOOKING = {*with_prefix("show"), *PICTURES, "verify", "check", "bench", "cli"}
+ASSEMBLY = {*with_prefix("assemble"), "simulation"}
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}
 
 
@@ -65,18 +66,24 @@ def test_the_map_in_the_package_names_every_module_once():
 def test_a_stepper_knows_no_fluid_and_a_fluid_no_stepper():
     """Both know fluid.py, the contract, and nothing of each other (numerics.md, section 3)."""
     assert "fluid" in imports("stepping")
-    assert not imports("stepping") & (FLUIDS | {"assemble", "simulation"})
+    assert not imports("stepping") & (FLUIDS | ASSEMBLY)
     for name in FLUIDS | {"fluid"}:
-        assert not imports(name) & {"stepping", "simulation", "assemble", "running", "loop", "timescales"}, name
+        assert not imports(name) & (ASSEMBLY | {"stepping", "running", "loop", "timescales"}), name
 
 
 def test_the_mechanics_know_no_fluid_and_no_stepper():
     for name in RODS & set(MODULES):
-        assert not imports(name) & (FLUIDS | {"stepping", "simulation", "assemble"}), name
+        assert not imports(name) & (FLUIDS | ASSEMBLY | {"stepping"}), name
+
+
+def test_physics_and_schemes_know_no_case():
+    """Only what is between them and the case file does: assemble and its sisters."""
+    for name in FLUIDS | RODS | {"fluid", "stepping", "marching", "thermal", *with_prefix("contact")}:
+        assert not imports(name) & (CASE | ASSEMBLY), name
 
 
 def test_the_numerics_know_no_files_and_no_screen():
-    for name in FLUIDS | RODS | {"stepping", "fluid", "assemble", "simulation", "timescales"}:
+    for name in FLUIDS | RODS | ASSEMBLY | {"stepping", "fluid", "timescales"}:
         assert not imports(name) & (RESULTS | LOOKING | DRAWING | {"running", "loop", "h5py", "tqdm"}), name
 
 
