@@ -64,7 +64,7 @@ def test_an_override_cannot_smuggle_in_another_key():
         ("fluid.drag.perp.x=1", "fluid.drag.perp.x", "unknown key"),
         ("filament.rod.bending.0=1", "filament.rod.bending.0", "filament.rod.bending = 2"),
         ("viscosity=1", "viscosity", "belongs in [fluid]"),
-        ("filament.rid.length=1", "filament.rid.nodes", "found nothing"),
+        ("filament.rid.length=1", "filament.rid", 'no such filament; did you mean "rod"?'),
         ("fluid.viscosity", "command line", "KEY=VALUE"),
         ("=1", "command line", "KEY=VALUE"),
         ("fluid..viscosity=1", "command line", "KEY=VALUE"),
