@@ -183,7 +183,9 @@ class End(Table):
     spin: OfT | None = Field(None, description="clamped, twist held: rate of e1 about e3, rad/time")
     angle: OfT | None = Field(None, description="the same as an angle, rad, instead of spin")
     tangent: Vector | None = Field(None, description="clamped: e3; absent: the start shape's")
-    moves: TripleT | None = Field(None, description="held ends: displacement of the held point")
+    moves: TripleT | None = Field(
+        None, description="held ends: displacement of the held point; what counts is its change since t = 0"
+    )
     force: TripleT | None = Field(None, description="external force on the end, lab frame")
     follower: OfT | None = Field(None, description="external force along +e3; at finish negative compresses")
     moment: TripleT | None = Field(None, description="external moment")

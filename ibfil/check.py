@@ -125,6 +125,10 @@ def absent(case: Case) -> list[str]:
         out.append("hydrodynamic interaction; grid and FFT plans")
     elif not assemble_grid.couples_torque(case):
         out.append("torque coupling of the spin to the grid")
+    if case.fluid.flow is not None:
+        out.append(
+            "the flow's couple across a rod's thickness: a straight one turns in shear towards the flow and never past it"
+        )
     if case.output.grid_every is None:
         out.append("field output")
     if case.contact is None:

@@ -10,6 +10,7 @@ from . import assemble_fluid, assemble_grid, shapes
 from .dimensionless import of_filament
 
 if TYPE_CHECKING:
+    from .case_filament import Filament
     from .case_schema import Case
     from .simulation import Simulation
 
@@ -33,6 +34,7 @@ def warnings(simulation: Simulation) -> list[str]:
         key = f"filament.{name}"
         found = of_filament(simulation, filament)
         out += _of_grid(key, found, case)
+        out += _of_held_ends(key, filament)
         out += _of_spin(simulation, key, filament)
         out += _of_images(simulation, key, name)
         if case.time.scheme != "explicit" and found.get("omega dt", 0.0) > 1.01 * ACCURATE_OMEGA_DT:
@@ -77,6 +79,19 @@ def _of_grid(key: str, found: dict[str, float], case: Case) -> list[str]:
             f"{key}: {found['wavelength/h']:.3g} cells a wavelength (wavelength/h): below {CELLS_A_WAVE} the "
             "rod is as thick as its waves; take more fluid.cells"
         )
+    return out
+
+
+def _of_held_ends(key: str, filament: Filament) -> list[str]:
+    """A displacement that is not zero as the run begins, and so does not displace."""
+    out = []
+    for side, end in (("start", filament.start), ("finish", filament.finish)):
+        begins = [] if end.moves is None else [float(part.bind("t")(0.0)) for part in end.moves]
+        if any(begins):
+            out.append(
+                f"{key}.{side}.moves: {begins} at t = 0, when the end stands where the shape puts it: only the change "
+                "from there moves it; begin at 0, as with -c*(1 - exp(-t/0.01))"
+            )
     return out
 
 

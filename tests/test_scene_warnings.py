@@ -40,6 +40,11 @@ FORCE = "fluid.box: the rods push the fluid with a net force"
         (["fluid.slip=0", "filament.rod.nodes=65"], "filament.rod: nodes are 0.5 cells apart and fluid.slip = 0"),
         (["output.every=0.2"], "output.every: 0.2 is beyond time.end = 0.1"),
         (["fluid.model=rft", "filament.rod.radius=0.3"], ""),  # a grid's matter
+        (["filament.rod.start={end='hinged', moves=['0.1*sin(t)', 0, '0.1*t']}", "time.step=1e-3"], ""),
+        (
+            ["filament.rod.start={end='hinged', moves=['0.1*cos(t)', 0, 0]}", "time.step=1e-3"],
+            "filament.rod.start.moves: [0.1, 0.0, 0.0]",
+        ),
     ],
 )
 def test_warnings(changes, said):
