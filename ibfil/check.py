@@ -126,9 +126,7 @@ def absent(case: Case) -> list[str]:
     elif not assemble_grid.couples_torque(case):
         out.append("torque coupling of the spin to the grid")
     if case.fluid.flow is not None:
-        out.append(
-            "the flow's couple across a rod's thickness: a straight one turns in shear towards the flow and never past it"
-        )
+        out.append("the flow's couple across a rod's thickness: a straight one turns towards a shear, never past it")
     if case.output.grid_every is None:
         out.append("field output")
     if case.contact is None:
