@@ -43,8 +43,10 @@ class Run(RunFile):
     _flow: Flow | None = None
 
     def __repr__(self) -> str:
-        filaments = ", ".join(
-            f"{name} ({columns['position'].shape[1]} nodes)" for name, columns in self.filaments.items()
+        from .show import listed
+
+        filaments = listed(
+            [f"{name} ({columns['position'].shape[1]} nodes)" for name, columns in self.filaments.items()]
         )
         span = f"t = {self.time[0]:g} to {self.time[-1]:g}"
         return f"<Run {self.path}: {self.status}, {len(self)} outputs, {span}; {filaments}>"

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from .case_checks_planar import check_planar
 from .case_faults import Fault, shown
-from .case_filament import Circle, End, Filament, Helix, RunShape, TwoWell
+from .case_filament import Circle, End, Filament, Helix, RunShape, TwoWell, copy_name, single
 from .case_schema import Scene
 from .expressions import Expression, ExpressionError
 
@@ -18,6 +18,9 @@ Axis = tuple[float, float, float]
 def check_filament(name: str, filament: Filament, case: Scene) -> Iterator[Fault]:
     """All faults of what does not go together in ``[filament.name]``."""
     key = f"filament.{name}"
+    stem = name.rpartition("_")[0]
+    if stem in case.filaments and single({stem: case.filaments[stem]}, name) is not None:
+        yield Fault(key, f"the name of a copy of {stem}", f"another name; copies are called {copy_name(stem, 0)} ...")
     yield from _numbers(key, filament)
     yield from _moduli(key, filament)
     yield from _law(f"{key}.law", filament)

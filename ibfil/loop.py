@@ -46,6 +46,12 @@ class Result:
     frame: Frame
     observers: Observers
 
+    def __repr__(self) -> str:
+        found = ", ".join(
+            f"{name} = {np.array2string(np.asarray(one.value), precision=6)}" for name, one in self.summaries.items()
+        )
+        return f"<Result {self.status}: {self.steps} steps, t = {self.frame.time:g}; {found or 'no observables'}>"
+
     @property
     def times(self) -> np.ndarray:
         """Times of the outputs (T,)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +90,7 @@ def as_text(told: Mapping[str, Any]) -> str:
     """The digest of a run for the eye."""
     unit = "" if told["units"]["time"] == "1" else " " + told["units"]["time"]
     end = f", until {told['finished']}" if told["finished"] else ""
-    nodes = ", ".join(f"{name} ({count} nodes)" for name, count in told["filaments"].items())
+    nodes = listed([f"{name} ({count} nodes)" for name, count in told["filaments"].items()])
     start, stop = told["time"]
     about = [
         ("run", f"{told['file']}: {told['status']}" + (f" ({told['reason']})" if told["reason"] else "")),
@@ -156,6 +156,13 @@ def table(rows: Iterable[Iterable[str]]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     kept = [i for i, width in enumerate(widths) if width]
     return ["  " + "  ".join(row[i].ljust(widths[i]) for i in kept).rstrip() for row in cells]
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """All names, or of many the first ones, the last and how many they are."""
+    if len(names) <= most:
+        return ", ".join(names)
+    return f"{', '.join(names[: most - 2])}, ..., {names[-1]}; {len(names)} in all"
 
 
 def _number(value: float | list[float | None] | None) -> str:

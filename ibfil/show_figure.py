@@ -218,8 +218,9 @@ def _motion(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
         if energy is not None:
             energies[words] = energy
     units = run.case.units
-    out = [("speed of the centroid", label(units, "length/time"), speeds)]
-    return out + ([("elastic energy", label(units, "force length"), energies)] if energies else [])
+    some = f", {len(XYZ)} of {len(run.filaments)} filaments" if len(run.filaments) > len(XYZ) else ""
+    out = [(f"speed of the centroid{some}", label(units, "length/time"), speeds)]
+    return out + ([(f"elastic energy{some}", label(units, "force length"), energies)] if energies else [])
 
 
 def _meaning(run: RunFile, name: str) -> str:

@@ -87,6 +87,8 @@ def test_one_copy_is_observed_by_its_name(tmp_path):
     case = scene(tmp_path, '{ file = "places.csv", orientation = "same" }', TIP.format(name="hair_001"))
     result = run(case, progress=False, log=lambda line: None)
     last = result.frame.filaments["hair_001"].position[-1]
+    assert repr(result).startswith("<Result finished: ")
+    assert "t = 0.01; tip = [" in repr(result)
     assert np.array_equal(result.summaries["tip"].value, last)
     assert last[0] > 0.5  # the force has moved it
     assert last[1] == pytest.approx(0.25)
@@ -112,3 +114,15 @@ def test_all_copies_at_once_are_no_observable(tmp_path):
     case = scene(tmp_path, copies, '[observe.heat]\nkind = "dissipation"')  # of all together
     result = run(case, progress=False, log=lambda line: None)
     assert result.summaries["heat"].value > 0
+
+
+@pytest.mark.parametrize(("name", "clashes"), [("hair_001", True), ("hair_01", False), ("hair_003", False)])
+def test_another_filament_has_another_name(tmp_path, name, clashes):
+    """Of two filaments of one name only the last would be written."""
+    more = f"[filament.{name}]\nlength = 1\nnodes = 9\nbending = 1\nstretching = 100"
+    copies = "{ count = 3, region = [[-1, -1, -1], [1, 1, 1]] }"
+    if clashes:
+        with pytest.raises(CaseError, match=r"filament\.hair_001: found the name of a copy of hair; allowed: another"):
+            scene(tmp_path, copies, more)
+    else:
+        assert len(Simulation(scene(tmp_path, copies, more)).frame().filaments) == 4

@@ -217,3 +217,8 @@ def test_a_run_without_observables_fields_or_stretch_is_drawn_too(run):
     titles = {axes.get_title(loc="left") for axes in show_figure.figure(bare).axes}
     motion = {"speed of the centroid (um/s)", "elastic energy (pN um)"}
     assert titles - {""} - motion == {"Shapes", "Centroid: start (ring) to end (dot)", "power on the fluid (pN um/s)"}
+
+
+def test_of_many_names_some_are_listed():
+    assert show.listed(["a", "b", "c", "d"]) == "a, b, c, d"
+    assert show.listed([f"f{i}" for i in range(200)]) == "f0, f1, ..., f199; 200 in all"
