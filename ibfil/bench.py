@@ -109,7 +109,7 @@ def rft_step(nodes: int = 128) -> Row:
     rods, state, scheme = simulation.mechanics, simulation.state_now, stepping.SemiImplicit()
     fluid = simulation.fluid
     force, inner = rods.forces(state.shape, state.time)
-    matrix = rods.stiffness(state.shape, state.shape, inner, state.time, True)
+    matrix = rods.definite_stiffness(state.shape, state.shape, inner, state.time)
     _system(matrix, fluid.drag, state.shape.e3, np.zeros_like(force), force, 100.0)  # type: ignore[attr-defined]
     width, diagonals = banded.lapack_form(matrix)
     room = np.zeros((3 * width + 1, diagonals.shape[1]), order="F")

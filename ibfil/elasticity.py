@@ -263,7 +263,7 @@ def _rows(stencils: Stencils, flux, matrix):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _tension(joined, rest, g, bend, stretching, clip, matrix):
+def _tension(joined, rest, g, bend, stretching, least, matrix):
     """Adds d(F'3 d/ds) = [ (EA/|d|) u u^T + (F'3/ds) 1 ] d(dr),  u = d/|d|; the part through P is in the fluxes."""
     w = matrix.shape[2] // 2
     for i in range(matrix.shape[0] - 1):
@@ -272,7 +272,7 @@ def _tension(joined, rest, g, bend, stretching, clip, matrix):
         j, ds, length, gap = i + 1, rest[i], g[i, LENGTH], at(g, i, GAP)
         p = bend[i, 0] * g[i, O1] + bend[i, 1] * g[i, O2] + bend[j, 0] * g[j, O1] + bend[j, 1] * g[j, O2]
         tension = stretching[i] * (1.0 - ds / length) - 0.5 * p
-        tension = (max(tension, 0.0) if clip else tension) / ds
+        tension = (least if tension < least else tension) / ds
         axial = stretching[i] / length**3
         for a in range(3):
             for c in range(3):
@@ -301,13 +301,13 @@ def _twist_sources(mesh: Mesh, g, bend, bend_slope, old, matrix):
 
 
 @njit(cache=True)
-def _stiffness(joined, rest, stencils: Stencils, g, bend, bend_slope, stretching, old, clip, flux, matrix):
+def _stiffness(joined, rest, stencils: Stencils, g, bend, bend_slope, stretching, old, least, flux, matrix):
     """The stiffness but for what is special to rods that twist; ``flux`` comes with what M3 adds to it, or zeros."""
     n, m, columns = matrix.shape
     by_node = matrix.reshape(n, m, columns // m, m)
     _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux[1:])
     _rows(stencils, flux, by_node)
-    _tension(joined, rest, g, bend, stretching, clip, by_node)
+    _tension(joined, rest, g, bend, stretching, least, by_node)
 
 
 def stiffness(
@@ -317,7 +317,7 @@ def stiffness(
     start: Geometry,
     moment: Moment,
     stretching: np.ndarray,
-    clip: bool,
+    least: float,
     matrix: np.ndarray,
 ) -> None:
     """Adds the exact Jacobian of ``nodal_force`` to ``matrix`` (n, m, (2 w + 1) m) of zeros: columns from node i - w.
@@ -329,8 +329,8 @@ def stiffness(
         dO1 = -e2.x + O2 dpsi,   dO2 = e1.x - O1 dpsi,   x = dr'' - (e3.r'') dr'/|r'|
 
     The flux through every face is first written as it follows the two nodes beside it, by dr'', dr' and dphi; these
-    then go through the stencils of the nodes. ``clip``: the compressive part of F'3 is left out of the matrix (never
-    of the force), which makes a single linear solve robust.
+    then go through the stencils of the nodes. F'3 below ``least`` stands in the matrix as ``least``: -inf for the exact
+    Jacobian, 0 to leave compression out of the geometric stiffness (never out of the force).
     """
     n, m, columns = matrix.shape
     flux = np.zeros((n + 1, 2, m, 7))
@@ -339,4 +339,4 @@ def stiffness(
         by_node = matrix.reshape(n, m, columns // m, m)
         _twist_fluxes(mesh.joined, mesh.ds, *what, moment.twist, moment.twist_slope, start.table, flux[1:])
         _twist_sources(mesh, *what, start.table, by_node)
-    _stiffness(mesh.joined, mesh.ds, stencils, *what, stretching, start.table, clip, flux, matrix)
+    _stiffness(mesh.joined, mesh.ds, stencils, *what, stretching, start.table, least, flux, matrix)

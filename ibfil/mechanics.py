@@ -153,10 +153,18 @@ class Mechanics:
             out[half] = np.stack([force[half], force[half + 1]], axis=1)
         return out
 
-    def stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, clip: bool) -> np.ndarray:
+    def stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float) -> np.ndarray:
         """The exact Jacobian of ``forces`` with respect to the displacements from ``start``, by bands."""
+        return self._stiffness(shape, start, moment, time, -np.inf)
+
+    def definite_stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float) -> np.ndarray:
+        """The same but for compression, which is left out of the geometric stiffness: one linear solve is robust."""
+        return self._stiffness(shape, start, moment, time, 0.0)
+
+    def _stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, least: float) -> np.ndarray:
+        """The Jacobian with tensions not below ``least`` (elasticity.stiffness)."""
         matrix = np.zeros(self._matrix_shape)
-        elasticity.stiffness(self.mesh, self._stencils, shape, start, moment, self.stretching, clip, matrix)
+        elasticity.stiffness(self.mesh, self._stencils, shape, start, moment, self.stretching, least, matrix)
         self._add_stiffness(Variation(self.mesh, shape, start, matrix), time)
         return matrix
 

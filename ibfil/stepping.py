@@ -10,6 +10,7 @@ of Eq. 38 is first order whatever the positions do. w = 0 is Euler: the first st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -55,11 +56,17 @@ class Rods(Protocol):
     def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Any]:
         """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""
 
-    def stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float, clip: bool) -> np.ndarray:
+    def stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float) -> np.ndarray:
         """The Jacobian of the forces with respect to y, a band matrix by node."""
+
+    def definite_stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float) -> np.ndarray:
+        """The same without compressive geometric stiffness, the part that may make it indefinite."""
 
     def held(self, before: float, after: float) -> Held:
         """The prescribed displacements between two times."""
+
+
+Stiffness = Callable[[Geometry, Geometry, Any, float], np.ndarray]  # one of the two of the rods
 
 
 class NotConverged(Exception):
@@ -131,7 +138,7 @@ class SemiImplicit:
         """One force, one stiffness, one linear solve."""
         after = state.time + dt
         force, inner = rods.forces(state.shape, after)
-        matrix = rods.stiffness(state.shape, state.shape, inner, after, True)
+        matrix = rods.definite_stiffness(state.shape, state.shape, inner, after)
         zero = np.zeros(force.shape)
         response = fluid.response(state.shape.r, state.shape.e3, after, dt)
         answer = response.implicit(force, matrix, rods.held(state.time, after), zero, zero)
@@ -148,16 +155,12 @@ class _Equation(NamedTuple):
     target: np.ndarray  # (n, m)
     held: Held
 
-    def correction(self, y: np.ndarray, shape: Geometry, clip: bool, most: float) -> tuple[Answer, float]:
-        """Newton's correction of y and its size; clipped too where an exact one is larger than ``most``."""
+    def correction(self, y: np.ndarray, shape: Geometry, stiffness: Stiffness) -> tuple[Answer, float]:
+        """Newton's correction of y, with the exact or the definite ``stiffness`` of the rods, and its size."""
         force, inner = self.rods.forces(shape, self.time)
-        while True:
-            matrix = self.rods.stiffness(shape, self.start, inner, self.time, clip)
-            answer = self.response.implicit(force, matrix, self.held, y, self.target)
-            size = _size(answer.move, self.rods.length)
-            if clip or size <= most:
-                return answer, size
-            clip = True
+        matrix = stiffness(shape, self.start, inner, self.time)
+        answer = self.response.implicit(force, matrix, self.held, y, self.target)
+        return answer, _size(answer.move, self.rods.length)
 
 
 def _stride(move: np.ndarray, shape: Geometry) -> float:
@@ -225,7 +228,7 @@ class Implicit:
         for count in range(1, self.most + 1):
             force, inner = rods.forces(shape, equation.time)
             if rate > self.again or not equation.response.keeps:
-                matrix = rods.stiffness(shape, equation.start, inner, equation.time, False)
+                matrix = rods.stiffness(shape, equation.start, inner, equation.time)
                 exact += 1
             answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
             size = _size(answer.move, rods.length)
@@ -247,18 +250,21 @@ class Implicit:
 
         ``stride``: the largest change of a segment by a correction; None: corrections are whole.
         """
-        clip, last = True, np.inf
+        rods, exact, last = equation.rods, False, np.inf
         for count in range(1, self.most + 1):
-            answer, size = equation.correction(y, shape, clip, 4 * last)
+            answer, size = equation.correction(y, shape, rods.stiffness if exact else rods.definite_stiffness)
+            if exact and not size <= 4 * last:
+                exact = False
+                answer, size = equation.correction(y, shape, rods.definite_stiffness)
             if not np.isfinite(size):
                 break
             part = 1.0 if stride is None else min(1.0, stride / max(_stride(answer.move, shape), 1e-300))
             y = y + part * answer.move
             # Newton squares the error, so two exact corrections in a row tell the size of the next.
-            coming = size * (size / last) ** 2 if not clip and count > 2 else size
+            coming = size * (size / last) ** 2 if exact and count > 2 else size
             if part == 1.0 and coming < self.tolerance:
                 return y, answer, count
-            shape, clip, last = equation.rods.move(equation.start, y), False, size
+            shape, exact, last = rods.move(equation.start, y), True, size
         worst = int(np.argmax(np.max(np.abs(answer.move), axis=1)))
         still = f"Newton's correction is still {size:.2g} of the length (allowed {self.tolerance:g})"
         if not np.isfinite(size):

@@ -109,7 +109,7 @@ class Trapezoid:
         """
         middle = state.time + 0.5 * dt
         force, inner = rods.forces(state.shape, middle)
-        matrix = rods.stiffness(state.shape, state.shape, inner, middle, False)
+        matrix = rods.stiffness(state.shape, state.shape, inner, middle)
         kicks = self.noise.force(state.shape, dt)
         index, value = rods.held(state.time, state.time + dt)
         zero = np.zeros_like(force)

@@ -189,7 +189,7 @@ def explicit_limit(rods: Mechanics, fluid: Fluid, shape: Geometry, time: float, 
     longer the step is, up to Stokes flow: then it is the step dt with dt = 2/rho(M(dt) K), which errs on the safe side.
     """
     force, inner = rods.forces(shape, time)
-    matrix = rods.stiffness(shape, shape, inner, time, False)
+    matrix = rods.stiffness(shape, shape, inner, time)
     held = Held(rods.ends.index, np.zeros(rods.ends.index.size))
     zero = np.zeros_like(force)
     x = np.random.default_rng(0).standard_normal(force.shape)

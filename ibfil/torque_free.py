@@ -162,9 +162,9 @@ class TorqueFree(Mechanics):
         turn = np.cross(g.gap, _next(g.d1) - g.d1) * (moment.twist / g.length)[:, None]
         return (_next(q) - q + turn) / g.length[:, None]
 
-    def stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, clip: bool) -> np.ndarray:
-        """The exact Jacobian of ``forces``, by bands."""
-        matrix = _Jacobian(self, shape, start, moment, clip).matrix
+    def _stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, least: float) -> np.ndarray:
+        """The Jacobian of ``forces`` by bands, with tensions not below ``least``."""
+        matrix = _Jacobian(self, shape, start, moment, least).matrix
         self._add_stiffness(_BisectorVariation(self.mesh, shape, start, matrix), time)
         return matrix
 
@@ -193,7 +193,7 @@ class _Jacobian:
     and with its turn dpsi = dphi + (e3 x old).de3/(1 + old.e3); each flux with the two nodes beside it, and with dd.
     """
 
-    def __init__(self, rods: TorqueFree, g: Geometry, start: Geometry, moment: Moment, clip: bool) -> None:
+    def __init__(self, rods: TorqueFree, g: Geometry, start: Geometry, moment: Moment, least: float) -> None:
         self.mesh, self.g, self.m3 = rods.mesh, g, moment.twist
         self.m, self.w = rods.unknowns, rods.profile.width
         self.b = _Bisectors(rods.mesh, g.r)
@@ -225,17 +225,17 @@ class _Jacobian:
             np.einsum("ia...,ia->i...", dm, g.bend) + np.einsum("ia...,ia->i...", do, moment.bend)
             for dm, do in ((m2, o2), (m1, o1), (ma, oa))
         )
-        self._segments(rods, moment, clip)
+        self._segments(rods, moment, least)
         for side in (0, 1):
             self._side(side, moment)
         if self.m == 4:
             self._source(rods._kink(self.b.u), bent)
 
-    def _segments(self, rods: TorqueFree, moment: Moment, clip: bool) -> None:
+    def _segments(self, rods: TorqueFree, moment: Moment, least: float) -> None:
         """The part of each flux on its own dd: 1/|d|, du in the twist term, tension."""
         g, b = self.g, self.b
         tension = rods._tension(g, moment, rods.stretching)
-        tension = (np.maximum(tension, 0.0) if clip else tension) / self.mesh.ds
+        tension = np.maximum(tension, least) / self.mesh.ds
         direct = _outer(b.u, b.u) * (rods.stretching / b.length)[:, None, None]
         direct = direct + tension[:, None, None] * np.eye(3)
         direct -= _outer(rods._bending_flux(g, moment), b.u) / b.length[:, None, None]

@@ -110,7 +110,7 @@ def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2
     y = 1e-3 * rng.standard_normal((n, m))
     shape = mechanics.move(start, y)
     force, inner = mechanics.forces(shape, BETWEEN[1])
-    stiffness = mechanics.stiffness(shape, start, inner, BETWEEN[1], False)
+    stiffness = mechanics.stiffness(shape, start, inner, BETWEEN[1])
     target = 1e-3 * rng.standard_normal((n, m))
     for _ in range(steps):
         made.advance(made.response(shape.r, shape.e3, BETWEEN[0], 0.8 * TAU), force)

@@ -147,7 +147,7 @@ def assert_exact_jacobian(rods: Mechanics, start, y: np.ndarray) -> None:
     """
     shape = rods.move(start, y)
     _, moment = rods.forces(shape, 0.0)
-    exact = banded.dense(rods.stiffness(shape, start, moment, 0.0, False))
+    exact = banded.dense(rods.stiffness(shape, start, moment, 0.0))
     numerical = numerical_jacobian(rods, start, y)
     for rows in (slice(0, 3), slice(3, 4)):
         for columns in (slice(0, 3), slice(3, 4)):
@@ -198,18 +198,18 @@ def test_without_twist_the_stiffness_is_the_same_block() -> None:
     matrices = []
     for rods in (three, four):
         _, moment = rods.forces(start, 0.0)
-        matrices.append(banded.dense(rods.stiffness(start, start, moment, 0.0, False)))
+        matrices.append(banded.dense(rods.stiffness(start, start, moment, 0.0)))
     assert np.abs(matrices[0] - matrices[1][:, :3, :, :3]).max() < 1e-12 * np.abs(matrices[0]).max()
 
 
 @KINDS
 @pytest.mark.parametrize("m", [3, 4])
-def test_clipping_leaves_out_the_compressive_tension_and_nothing_else(kind: type[Mechanics], m: int) -> None:
+def test_the_definite_stiffness_leaves_out_the_compression_and_nothing_else(kind: type[Mechanics], m: int) -> None:
     """The difference of the two matrices is F'3/ds 1 on the segments where F'3 < 0."""
     rods = bare(pair(True, 6), kind=kind, unknowns=m, strains=preferred)
     shape = rods.start(wild(len(S)), directors(2 * len(S)))
     _, moment = rods.forces(shape, 0.0)
-    exact, clipped = (banded.dense(rods.stiffness(shape, shape, moment, 0.0, clip)) for clip in (False, True))
+    exact, definite = (banded.dense(of(shape, shape, moment, 0.0)) for of in (rods.stiffness, rods.definite_stiffness))
     mesh, p = rods.mesh, np.sum(moment.bend * shape.bend, axis=1)
     expected = np.zeros_like(exact)
     seen = set()
@@ -223,7 +223,7 @@ def test_clipping_leaves_out_the_compressive_tension_and_nothing_else(kind: type
             expected[i + 1, c, i + 1, c] -= b
             expected[i + 1, c, i, c] += b
     assert seen == {True, False}
-    assert np.abs((exact - clipped) - expected).max() < 1e-12 * np.abs(exact).max()
+    assert np.abs((exact - definite) - expected).max() < 1e-12 * np.abs(exact).max()
 
 
 # The linear law, Eq. 9

@@ -150,7 +150,7 @@ def test_the_solver_knows_how_far_a_domain_wall_reaches() -> None:
     mechanics = Simulation(scene({"rod": {**rod, "shape": {"kind": "relaxed"}}})).mechanics
     shape = mechanics.start(*(np.random.default_rng(k).standard_normal((15, 3)) for k in (0, 1)))
     _, moment = mechanics.forces(shape, 0.0)
-    matrix = mechanics.stiffness(shape, shape, moment, 0.0, False)
+    matrix = mechanics.stiffness(shape, shape, moment, 0.0)
     whole = banded.dense(matrix).reshape(60, 60)
     rows, width = np.arange(15), mechanics.profile.width
     assert np.all(mechanics.profile.first >= rows - width)

@@ -72,7 +72,7 @@ def growth(force: float, nodes: int, follower: bool) -> float:
     simulation = settled({**rod, "derivative": 2})
     mechanics, shape = simulation.mechanics, simulation.shape
     _, moment = mechanics.forces(shape, 0.0)
-    k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0, False))[1:, 1, 1:, 1]
+    k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0))[1:, 1, 1:, 1]
     z = np.diag(PERP * mechanics.mesh.volume[1:])
     return float(np.max(eigvals(k, z).real))
 

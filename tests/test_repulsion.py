@@ -112,7 +112,7 @@ def test_the_stiffness_of_a_segment_on_itself_is_exact_along_the_gap():
 
     def matrix(mechanics) -> np.ndarray:
         _, moment = mechanics.forces(shape, 0.0)
-        return mechanics.stiffness(shape, shape, moment, 0.0, False)
+        return mechanics.stiffness(shape, shape, moment, 0.0)
 
     without = Simulation(case(crossed(0.03, 0.0), None)).mechanics
     from ibfil import banded

@@ -181,7 +181,7 @@ def test_a_step_solves_its_own_equation_to_the_tolerance(build: Build) -> None:
         state = step.state
         force, moment = mechanics.forces(state.shape, state.time)
         residual = rft.resist(drag, before.shape.e3, state.y_old) / (END / 20) - force - step.reaction
-        matrix = mechanics.stiffness(state.shape, before.shape, moment, state.time, False)
+        matrix = mechanics.stiffness(state.shape, before.shape, moment, state.time)
         largest = np.abs(matrix).sum(axis=2) + max(drag.perp.max(), drag.spin.max()) / (END / 20)
         assert np.all(np.abs(residual) <= 1e-8 * largest)
         assert step.iterations <= 4
@@ -270,7 +270,7 @@ def dense_limit(simulation: Simulation) -> float:
     """2 over the largest eigenvalue of Z^-1 K, by LAPACK, held unknowns struck out."""
     mechanics, shape = simulation.mechanics, simulation.shape
     _, moment = mechanics.forces(shape, simulation.time)
-    k = banded.dense(mechanics.stiffness(shape, shape, moment, simulation.time, False))
+    k = banded.dense(mechanics.stiffness(shape, shape, moment, simulation.time))
     n, m = k.shape[:2]
     drag = assemble_fluid.drag(simulation.case, assemble.rods(simulation.case))
     for i in range(n):

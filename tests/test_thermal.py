@@ -150,7 +150,7 @@ def test_the_stiffness_of_a_straight_rod_at_rest_is_symmetric(ends, spacing, for
         simulation = Simulation(scene({"rod": {**rod, "derivative": derivative}}))
         mechanics, shape = simulation.mechanics, simulation.shape
         _, inner = mechanics.forces(shape, 0.0)
-        k = banded.dense(mechanics.stiffness(shape, shape, inner, 0.0, False)).reshape(44, 44)
+        k = banded.dense(mechanics.stiffness(shape, shape, inner, 0.0)).reshape(44, 44)
         free = np.setdiff1d(np.arange(44), mechanics.ends.index)
         k = k[np.ix_(free, free)]
         uneven = np.max(np.abs(k - k.T)) / np.max(np.abs(k))

@@ -84,7 +84,7 @@ def bending_matrices(rod: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     simulation = settled(rod)
     mechanics, shape = simulation.mechanics, simulation.shape
     _, moment = mechanics.forces(shape, 0.0)
-    k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0, False))[1:, 1, 1:, 1]
+    k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0))[1:, 1, 1:, 1]
     return k, np.diag(PERP * mechanics.mesh.volume[1:])
 
 
@@ -143,7 +143,7 @@ def test_twist_diffuses_along_an_uneven_rod_at_the_known_rate(spacing: str) -> N
         simulation = Simulation(scene({"rod": rod}))
         mechanics, shape = simulation.mechanics, simulation.shape
         _, moment = mechanics.forces(shape, 0.0)
-        k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0, False))[1:, 3, 1:, 3]
+        k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0))[1:, 3, 1:, 3]
         rate = -np.max(eigvals(k, np.diag(4 * np.pi * 0.01 * mechanics.mesh.volume[1:])).real)
         errors.append(abs(rate / (0.7 * np.pi**2 / 4 / (4 * np.pi * 0.01)) - 1))
     assert errors[1] < 1e-3

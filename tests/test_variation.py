@@ -76,7 +76,7 @@ def test_the_stiffness_of_a_load_is_the_derivative_of_its_force(force: str, m: i
     applied, moment = mechanics.forces(shape, TIME)
     assert np.abs(applied[:N]).max() > 0.01
     assert np.abs(applied[N:]).max() > 0.01
-    exact = banded.dense(mechanics.stiffness(shape, start, moment, TIME, False))
+    exact = banded.dense(mechanics.stiffness(shape, start, moment, TIME))
     numerical = np.zeros_like(exact)
     for j, c in np.ndindex(y.shape):
         ahead, behind = y.copy(), y.copy()

@@ -30,7 +30,7 @@ def diffusion_ratio(case: Case, lag: float) -> float:
     mechanics, shape = simulation.mechanics, simulation.shape
     n, m = len(shape.r), mechanics.unknowns
     moment = mechanics.moment(shape, 0.0)
-    stiffness = dense(mechanics.stiffness(shape, shape, moment, 0.0, False)).reshape(n * m, n * m)
+    stiffness = dense(mechanics.stiffness(shape, shape, moment, 0.0)).reshape(n * m, n * m)
     root = _inverse_root(simulation.fluid.drag, shape.e3, m)
     scaled = root @ (-0.5 * (stiffness + stiffness.T)) @ root
     rates, modes = np.linalg.eigh(scaled)
