@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import assemble_grid
+from . import assemble_grid, timescales
 from .budget import disk, flow_parts, memory, shares, terms
 from .case import idle_keys
 from .case_schema import Matched
@@ -203,9 +203,11 @@ def _steps(simulation: Simulation) -> list[str]:
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
     ]
     if case.fluid.model == "navier-stokes":
-        given = "told" if case.time.step != "auto" and case.time.tolerance is None else "steps are shortened for it"
+        limited = "steps are shortened for it" if case.time.tolerance is not None else "told"
+        if case.time.step == "auto" and case.time.tolerance is None:
+            limited = f"steps are shortened to that, to {timescales.CELLS:g} of it where rho u h/eta is large"
         lines.append(
-            f"advection is extrapolated: stable while the fluid crosses less than about a cell a step ({given})"
+            f"advection is extrapolated: stable while the fluid crosses less than about a cell a step ({limited})"
         )
     rates = simulation.driving_rates()
     if rates and max(rates) > 0:

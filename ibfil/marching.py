@@ -70,8 +70,10 @@ class EvenSteps:
             after_step()
 
     def _parts(self, walker: Walker, until: float) -> int:
-        """How many steps there are to ``until``."""
-        length = min(self.length, walker.longest_step())
+        """How many steps there are to ``until``: as long as before where the fluid limits them, or HELD times that."""
+        length, longest, old = self.length, walker.longest_step(), walker.state_now.dt_old
+        if longest < MARGIN * length:
+            length = old if old <= longest < HELD * MARGIN * old else longest / MARGIN
         return max(1, int(np.ceil((until - walker.time) / length * (1 - 1e-9))))
 
     def _step_to(self, walker: Walker, goal: float) -> None:

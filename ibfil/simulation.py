@@ -221,8 +221,15 @@ class Simulation:
 
     def longest_step(self) -> float:
         """What the fluid's own motion leaves to steps that are not given; infinite for those that are."""
-        given = self.case.time.step != "auto" and self.case.time.tolerance is None
-        return np.inf if given else self.fluid.longest_step()
+        time, longest = self.case.time, self.fluid.longest_step()
+        if time.tolerance is not None or longest == np.inf:
+            return longest
+        if time.step != "auto":
+            return np.inf
+        assert self.grid is not None
+        density, viscosity = self.case.fluid.density, self.case.fluid.viscosity
+        assert density is not None
+        return longest * timescales.crossing(density * self.grid.spacing**2 / (viscosity * longest))
 
     def give_up(self, reason: str, dt: float, node: int | None = None) -> None:
         """Raises RunFailed: no step of length dt can be taken, because of ``node`` if that is known."""

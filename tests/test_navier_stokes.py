@@ -23,6 +23,7 @@ from ibfil.simulation import Simulation
 from ibfil.slab import Block
 from ibfil.stepping import NotConverged
 from ibfil.stokes import StokesByTable
+from ibfil.timescales import crossing
 from ibfil.torque_coupling import StirredSolve, TorqueCoupling
 
 NOTHING = Held(np.zeros(0, np.int64), np.zeros(0))
@@ -514,14 +515,17 @@ def test_the_error_keeps_within_the_tolerance(density):
 
 
 def test_automatic_steps_let_no_fluid_cross_more_than_a_cell():
-    """A stream of 10 past a swimmer, whose own motion asks for 25 steps a period: cells of 1/16, so steps of 1/160."""
+    """A stream of 10 past a swimmer, whose own motion asks for 25 steps a period: cells of 1/16, so steps of 1/160.
+
+    Automatic ones are shorter by what rho u h/eta = 10/16 asks for.
+    """
     settings = {"rod": {"nodes": 11}, "stretching": 300.0, "end": 2 * np.pi / 10}
     stream = inertial(1.0, flow=["10", "0", "0"])
     assert run(swimmer(inertial(1.0), **settings)).steps in (25, 26)
-    for more in ({}, {"tolerance": 0.5}):
+    for more, part in (({}, crossing(10 / 16)), ({"tolerance": 0.5}, 1.0)):
         simulation, ends = Simulation(swimmer(stream, **settings, **more)), [0.0]
         simulation.advance(settings["end"], lambda s=simulation, ends=ends: ends.append(s.time))
-        assert 1 / 250 < max(np.diff(ends)) < 1.0001 / 160
+        assert part / 250 < max(np.diff(ends)) < 1.0001 * part / 160
 
 
 def test_given_steps_in_which_the_fluid_goes_too_far_are_told_once():
