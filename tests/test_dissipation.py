@@ -46,12 +46,13 @@ def ran(*overrides: str, twist: str = "") -> Result:
 
 @pytest.mark.parametrize("method", ["table", "fft", "krylov"])
 def test_both_sides_are_one_number_in_stokes(method):
-    """To 1e-10; and what slips is s F^2, s = eps (h/2 ds)/(6 pi eta a) with the point radius a = 1.313 h."""
+    """To 1e-10; and what slips is s F^2, s = eps (h/2 Lc)/(6 pi eta a) with the point radius a = 1.313 h."""
     frame = ran(f"fluid.method={method}").frame
     found, force = frame.diagnostics, frame.filaments["rod"].force
     assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
-    slip = 0.01 * (0.125 / (2 * 0.1)) / (6 * np.pi * 0.7 * 1.313 * 0.125)
-    assert found["slip_power"] == pytest.approx(slip * np.sum(force**2), rel=1e-12)
+    volume = 0.1 * np.array([0.5, *np.ones(9), 0.5])[:, None]
+    slip = 0.01 * (0.125 / (2 * volume)) / (6 * np.pi * 0.7 * 1.313 * 0.125)
+    assert found["slip_power"] == pytest.approx(np.sum(slip * force**2), rel=1e-12)
 
 
 @pytest.mark.parametrize(("keys", "twist"), [([], ""), (["fluid.rotation=grid"], TWISTED)], ids=["plain", "torques"])
@@ -101,6 +102,17 @@ def test_drag_turns_into_heat_what_the_flow_does_not_carry():
     stream = ran("fluid.model=rft", "fluid.flow=[3, 0, 0]").frame.diagnostics
     still = ran("fluid.model=rft").frame.diagnostics
     assert stream["dissipation"] == pytest.approx(still["dissipation"], rel=1e-6)  # Galileo
+
+
+def test_a_rod_that_does_not_give_way_heats_the_flow_along_it():
+    """zeta_par (gamma x)^2 per length of a straight rod held by its stiffness in u = gamma (-x, y, 0)."""
+    straight = ["filament.rod.shape={kind='straight'}", "filament.rod.stretching=1e6"]
+    frame = ran("fluid.model=rft", "fluid.flow=['-2*x', '2*y', 0]", *straight).frame
+    s, lc = np.linspace(-0.5, 0.5, 11), 0.1 * np.array([0.5, *np.ones(9), 0.5])
+    expected = np.sum(lc * 2 * np.pi * 0.7 * (2 * s) ** 2)
+    # It is shortened by the drag of half of it over EA, zeta_par gamma L^2/8 EA, and moves until it is.
+    assert frame.diagnostics["dissipation"] == pytest.approx(expected, rel=1e-5)
+    assert abs(frame.diagnostics["power"]) < 1e-5 * expected
 
 
 def test_inertia_keeps_the_rest_as_the_energy_of_the_flow():

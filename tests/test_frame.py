@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import run, scene, slopes
+from scenes import RFT, STOKES, run, scene, slopes
 from scipy.spatial.transform import Rotation
 
 from ibfil.directors import carry
@@ -115,7 +115,7 @@ def test_a_rod_may_turn_by_up_to_168_degrees_within_a_step() -> None:
 # A clamp that turns. C and the drag are such that nothing but the clamp matters: e1 there is prescribed.
 
 
-def spun(end: dict[str, object], *, at: str = "start", scheme: str = "implicit") -> Simulation:
+def spun(end: dict[str, object], *, at: str = "start", scheme: str = "implicit", fluid=RFT) -> Simulation:
     rod = {
         "length": 1.0,
         "nodes": 9,
@@ -127,17 +127,19 @@ def spun(end: dict[str, object], *, at: str = "start", scheme: str = "implicit")
         "normal": [0, 1, 0],
         at: {"end": "clamped", **end},
     }
-    return run(scene({"rod": rod}, end=0.35, step=0.05, scheme=scheme))
+    return run(scene({"rod": rod}, fluid, end=0.35, step=0.05, scheme=scheme))
 
 
 @pytest.mark.parametrize("scheme", ["semi-implicit", "implicit"])
-def test_a_spun_clamp_holds_e1_at_cos_wt_y_plus_sin_wt_z(scheme: str) -> None:
-    """Sec. 7.6, corrected: the printed cos x + sin y is not normal to a rod along x."""
+@pytest.mark.parametrize("fluid", [RFT, STOKES, {**STOKES, "rotation": "grid"}], ids=["rft", "stokes", "stirred"])
+@pytest.mark.parametrize(("at", "node"), [("start", 0), ("finish", -1)])
+def test_a_spun_clamp_holds_e1_at_cos_wt_y_plus_sin_wt_z(scheme: str, fluid: dict, at: str, node: int) -> None:
+    """Sec. 7.6, corrected: the printed cos x + sin y is not normal to a rod along x. One linear solve is enough."""
     w = 5.0
-    simulation = spun({"spin": w}, scheme=scheme)
+    simulation = spun({"spin": w}, scheme=scheme, fluid=fluid, at=at)
     t = simulation.time
-    assert simulation.shape.e1[0] == pytest.approx(np.cos(w * t) * Y + np.sin(w * t) * Z, abs=1e-14)
-    assert np.array_equal(simulation.shape.r[0], Simulation(simulation.case).shape.r[0])
+    assert simulation.shape.e1[node] == pytest.approx(np.cos(w * t) * Y + np.sin(w * t) * Z, abs=1e-14)
+    assert np.array_equal(simulation.shape.r[node], Simulation(simulation.case).shape.r[node])
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,11 @@ def test_a_twist_couple_twists_a_rod_by_m3_over_c(end: str, frame: str) -> None:
     sign, s = (1 if end == "finish" else -1), simulation.arclength
     expected = sign * 0.3 / (0.5 * (1 / (2 + s[1:]) + 1 / (2 + s[:-1])))
     assert simulation.shape.twist[:-1] == pytest.approx(expected, rel=1e-9)
+    # At nodes: the mean of the half nodes beside them, at an end that of the one there is.
+    nodal = np.concatenate([expected[:1], 0.5 * (expected[1:] + expected[:-1]), expected[-1:]])
+    found = simulation.frame().filaments["rod"]
+    assert found.strain[:, 2] == pytest.approx(nodal, rel=1e-9)
+    assert found.moment[:, 2] == pytest.approx(np.full(33, sign * 0.3), rel=1e-9)
     assert np.abs(simulation.shape.r[:, 1:]).max() < 1e-12
 
 
