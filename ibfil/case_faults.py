@@ -58,6 +58,13 @@ class Entry(NamedTuple):
 
     def allowed(self) -> str:
         """What may stand there."""
+        hint = unwrapped(self.hint)
+        if (
+            get_origin(hint) is dict
+            and isinstance(get_args(hint)[1], type)
+            and issubclass(get_args(hint)[1], BaseModel)
+        ):
+            return "tables by names of yours, such as [filament.rod]"
         return describe(self.hint, self.metadata)
 
 

@@ -127,10 +127,11 @@ class Recorder:
         writing it.
         """
         refuse_existing(path, overwrite)
+        new = not path.exists()
         with _writing(path), _owned(path):
             file = JournaledFile(path, journal_path(path), create=True)
         self = cls(path, file, case.units, grid)
-        with _closing(self), _writing(path, file):
+        with _begun(path, new), _closing(self), _writing(path, file):
             checkpoint_path(path).unlink(missing_ok=True)  # before the run it belongs to
             file.clear()
             self._h5 = h5py.File(file, "w")
@@ -328,6 +329,19 @@ def _closing(recorder: Recorder) -> Iterator[None]:
         yield
     except BaseException:
         recorder.close()
+        raise
+
+
+@contextlib.contextmanager
+def _begun(path: Path, new: bool) -> Iterator[None]:
+    """Leave nothing behind of a ``new`` file that could not be begun."""
+    try:
+        yield
+    except RunFailed as failure:
+        if new:
+            path.unlink(missing_ok=True)
+            journal_path(path).unlink(missing_ok=True)
+            failure.advice = "free some space, or write elsewhere with -o; nothing was written"
         raise
 
 

@@ -53,6 +53,8 @@ def named(name: str) -> Path:
     known = paths()
     if name in known:
         return known[name]
+    if Path(name).is_dir():
+        raise CaseError([f"{name}: is a folder; allowed: a case file, or the name of a shipped case"])
     near = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean '{near[0]}'? " if near else ""
     raise CaseError([f"{name}: no such file, and no shipped case of that name; {hint}`ibfil cases` lists them"])

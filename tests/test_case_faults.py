@@ -112,6 +112,7 @@ def test_there_must_be_a_filament(value):
 def test_an_empty_file():
     lines = fault_lines({})
     assert [line.split(":")[1].strip() for line in lines] == ["filament", "fluid", "time", "output"]
+    assert lines[0].endswith("allowed: tables by names of yours, such as [filament.rod]")
 
 
 def test_a_misspelt_name_on_the_command_line_is_no_new_filament():

@@ -312,6 +312,12 @@ def test_new_copies_a_shipped_case(here, capsys):
     assert (here / "mine.toml").read_bytes() == shipped.paths()["swimmer_stokes"].read_bytes()
 
 
+def test_a_folder_is_no_case(here, capsys):
+    (here / "d.toml").mkdir()
+    assert cli.main(["check", "d.toml"]) == 2
+    assert "d.toml: is a folder; allowed: a case file" in capsys.readouterr().err
+
+
 def test_a_file_wins_over_a_shipped_name(here):
     assert shipped.find("swimmer_stokes") == shipped.paths()["swimmer_stokes"]
     (here / "swimmer_stokes").write_text(BENT)

@@ -223,3 +223,18 @@ def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path, monkeypatch):
     with pytest.raises(RunFailed, match=r"cannot be written \(Permission denied\)"):
         begin(tmp_path / "run.h5", next(frames(1)))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_is_full_from_the_start_keeps_no_empty_file(tmp_path, monkeypatch):
+    """Which would refuse the next try."""
+
+    def pwrite(handle, data, at):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = tmp_path / "run.h5"
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pwrite", pwrite)
+        with pytest.raises(RunFailed, match="No space left on device") as caught:
+            begin(path, next(iter(frames(2))))
+    assert "nothing was written" in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
