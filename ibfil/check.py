@@ -183,7 +183,8 @@ def _costs(simulation: Simulation) -> list[str]:
         others = ", ".join(f"{k} {v:.2g}" for k, v in simulation.method_seconds.items() if np.isfinite(v))
         lines.append(f"seconds a step, from counts: {others}")
     steps, seconds = case.time.end / simulation.step_length, simulation.method_seconds[simulation.method]
-    total = f"about {steps:.0f} steps, {steps * seconds:.2g} s after start-up"
+    may = "at least " if case.fluid.model == "navier-stokes" and case.time.step == "auto" else ""  # see _steps
+    total = f"{may}about {steps:.0f} steps, {steps * seconds:.2g} s after start-up"
     if case.time.tolerance is not None:
         total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
     lines.append(f"{total}, from counts (within a factor 3)")
