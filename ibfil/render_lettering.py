@@ -45,7 +45,8 @@ def lettered(view: np.ndarray, height: int, words: Words, time: str) -> np.ndarr
     edge = round(0.02 * width)
     pen.text((width - edge, top // 2), time, INK, large, "rm")
     room = width - 3 * edge - pen.textlength(time, large)
-    pen.text((edge, top // 2), _shortened(pen, words.title, small, room), INK, small, "lm")
+    fitting = _fitting(pen, words.title, height, room)
+    pen.text((edge, top // 2), _shortened(pen, words.title, fitting, room), INK, fitting, "lm")
     foot = top + view.shape[0]
     _scale_bar(pen, small, (edge, foot), 0.22 * width, height, words)
     share = (0.72 * width - edge) / max(len(words.bars), 1)
@@ -66,6 +67,15 @@ def _font(size: int) -> FreeTypeFont:
     from PIL import ImageFont
 
     return ImageFont.truetype(findfont("DejaVu Sans"), size)
+
+
+def _fitting(pen: ImageDraw, text: str, height: int, room: float) -> FreeTypeFont:
+    """Letters small enough for a text, but no smaller than can be read."""
+    for size in (0.026, 0.022, 0.019):
+        font = _font(round(size * height))
+        if pen.textlength(text, font) <= room:
+            return font
+    return font
 
 
 def _shortened(pen: ImageDraw, text: str, font: FreeTypeFont, room: float) -> str:

@@ -36,4 +36,12 @@ def _joined(pieces: list[np.ndarray]) -> list[np.ndarray]:
         np.vstack([pieces[start][:1], *(piece[1:] for piece in pieces[start:end])])
         for start, end in pairwise([0, *cuts, len(pieces)])
     )
-    return [line[np.append(True, np.any(np.diff(line, axis=0) != 0.0, axis=1))] for line in lines]
+    return [_once_round(line[np.append(True, np.any(np.diff(line, axis=0) != 0.0, axis=1))]) for line in lines]
+
+
+def _once_round(line: np.ndarray) -> np.ndarray:
+    """The line until it has turned by a whole turn: about a vortex it would wind on."""
+    step = np.diff(line, axis=0)
+    turned = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+    beyond = np.nonzero(np.abs(turned - turned[:1]) > 2 * np.pi)[0]
+    return line[: beyond[0] + 1] if len(beyond) else line

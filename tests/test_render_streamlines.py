@@ -27,6 +27,8 @@ def test_lines_go_with_the_flow_and_fill_the_plane(name):
         step, middle = np.diff(line, axis=0), 0.5 * (line[1:] + line[:-1])
         size = np.linalg.norm(step, axis=1)
         assert np.all(size > 0)
+        turned = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+        assert abs(turned[-1] - turned[0]) < 2.5 * np.pi  # about a vortex once, and not again
         flow = {
             "uniform": lambda p: np.stack([np.ones(len(p)), np.zeros(len(p))], 1),
             "stagnation point": lambda p: p * [1, -1],
