@@ -127,9 +127,9 @@ def _solver(case: Case, stacked: Stacked, grid: Grid, method: str) -> stokes.Sol
     """What evaluates velocities by FFT: of the whole grid, or where that is cheaper of the filaments' bounding box."""
     eta, threads = case.fluid.viscosity, case.compute.threads
     if assemble_grid.couples_torque(case):
-        from .torque_coupling import StirredSolve
+        from .torque_coupling import TorqueStokesSolve
 
-        return StirredSolve(grid, eta, threads)
+        return TorqueStokesSolve(grid, eta, threads)
     if method == "fft" or (method == "krylov" and not fills_little(case, stacked, grid)):
         from .stokes import StokesSolve
 

@@ -10,7 +10,7 @@ from . import stokes
 from .assemble_loads import number, triple
 from .navier_stokes import Background, NavierStokes, Part, Room
 from .separation import products
-from .torque_coupling import StirredSolve
+from .torque_coupling import TorqueStokesSolve
 
 if TYPE_CHECKING:
     from .case_schema import Case
@@ -34,7 +34,7 @@ def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> Navi
         if made.coupling.vectors == 1:
             solver = stokes.StokesSolve(made.grid, made.viscosity, threads, alpha=alpha, transform=shared)
         else:
-            solver = StirredSolve(made.grid, made.viscosity, threads, alpha, shared)
+            solver = TorqueStokesSolve(made.grid, made.viscosity, threads, alpha, shared)
         if method == "krylov":
             return stokes.StokesByKrylov(made, solver, worth, alpha)
         return stokes.StokesByFFT(made, solver, alpha)

@@ -163,7 +163,7 @@ def half_curl(source, kx, ky, kz, target):
                 target[2, i, j, k] += 0.5j * (kx[i] * y - ky[j] * x)
 
 
-class StirredSolve:
+class TorqueStokesSolve:
     """Velocities and half vorticities of forces and torques, by whole FFTs (stokes.Solver).
 
     ``alpha`` is density over time, zero in Stokes flow; a ``transform`` of 6 fields at hand is used, and what it held

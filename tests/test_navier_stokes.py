@@ -24,7 +24,7 @@ from ibfil.slab import Block
 from ibfil.stepping import NotConverged
 from ibfil.stokes import StokesByTable
 from ibfil.timescales import crossing
-from ibfil.torque_coupling import StirredSolve, TorqueCoupling
+from ibfil.torque_coupling import TorqueCoupling, TorqueStokesSolve
 
 NOTHING = Held(np.zeros(0, np.int64), np.zeros(0))
 FAR = np.array([[0.3, -0.2, 0.1]])  # a node to ask at
@@ -465,7 +465,7 @@ def test_a_torque_on_fluid_at_rest_leaves_the_flow_that_the_stirred_solve_has():
     it, nodes = stirred()
     tau, push = 0.2, np.array([[0.3, -0.1, 0.2, 0.7]])
     it.advance(it.response(FAR, nodes.axes, 0.0, tau), push)
-    solve = StirredSolve(it.fluid.grid, 0.3, alpha=2.0 / tau)
+    solve = TorqueStokesSolve(it.fluid.grid, 0.3, alpha=2.0 / tau)
     expected = solve.velocity(nodes.base, nodes.weights, it.fluid.coupling.lift(nodes.axes, push))[0, :3]
     assert it.velocity_at(FAR, FAR, nodes.axes, push, tau)[0] == pytest.approx(expected, rel=1e-10)
 

@@ -15,7 +15,7 @@ from ibfil.grid import Grid, interpolate, spread
 from ibfil.immersed_boundary import Immersed
 from ibfil.kernels import KERNELS
 from ibfil.stokes import StokesByFFT, StokesByTable, StokesSolve
-from ibfil.torque_coupling import StirredSolve, TorqueCoupling
+from ibfil.torque_coupling import TorqueCoupling, TorqueStokesSolve
 
 KERNEL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 H = 0.1
@@ -52,7 +52,7 @@ def test_table_is_the_fft_operator(kernel, cells):
     fluid = immersed(kernel, cells, count)
     r, e3 = scattered(cells, count, 1), tangents(count, 2)
     force = np.random.default_rng(3).standard_normal((count, 4))
-    solver = StirredSolve(fluid.grid, fluid.viscosity)
+    solver = TorqueStokesSolve(fluid.grid, fluid.viscosity)
     moves = []
     for made in (StokesByTable(fluid), StokesByFFT(fluid, solver)):
         moves.append(made.response(r, e3, 0.0, 1.0).forced(force, NONE, np.zeros((count, 4))).move)
@@ -145,7 +145,7 @@ def test_far_from_it_a_torque_drives_a_rotlet():
     base, weights = kernel.stencil(grid.coordinates(r))
     pushes = np.zeros((2, 6))
     pushes[0, 3:] = torque
-    moved = StirredSolve(grid, eta).velocity(base, weights, pushes)[1]
+    moved = TorqueStokesSolve(grid, eta).velocity(base, weights, pushes)[1]
     x = r[1] - r[0]
     d = np.linalg.norm(x)
     u = np.cross(torque, x) / (8 * np.pi * eta * d**3)
@@ -170,7 +170,7 @@ def test_a_torque_is_the_limit_of_a_couple_of_forces():
     base, weights = kernel.stencil(grid.coordinates(np.array([[0.0, 0, 0], there])))
     pushes = np.zeros((2, 6))
     pushes[0, 3] = 1.0
-    stirred = StirredSolve(grid, 1.0).velocity(base, weights, pushes)[1, :3]
+    stirred = TorqueStokesSolve(grid, 1.0).velocity(base, weights, pushes)[1, :3]
     errors = [float(np.linalg.norm(couple - stirred) / np.linalg.norm(stirred)) for couple in couples]
     assert slopes(errors) == pytest.approx([2.0, 2.0], abs=0.1)
     assert errors[-1] < 0.01**2  # in units of the box's length over 4.8, in which the flow varies
@@ -194,7 +194,7 @@ def line_spin(kernel: str, along: tuple[int, int, int], ds: float, place: np.nda
     r = (np.arange(count) / count - 0.5)[:, None] * length * e3 + place * H
     base, weights = k.stencil(grid.coordinates(r))
     pushes = np.hstack([np.zeros((count, 3)), np.tile(e3 * length / count, (count, 1))])
-    return float(np.mean(StirredSolve(grid, 1.0).velocity(base, weights, pushes)[:, 3:] @ e3))
+    return float(np.mean(TorqueStokesSolve(grid, 1.0).velocity(base, weights, pushes)[:, 3:] @ e3))
 
 
 @KERNEL
