@@ -119,23 +119,6 @@ def spread(base, weights, force, field):
 
 
 @njit(cache=True)
-def clear(base, points, field):
-    """Zeros field where ``spread`` wrote: cheaper than clearing the whole grid."""
-    n = base.shape[0]
-    nx, ny, nz = field.shape[1:]
-    for q in range(n):
-        for i in range(points):
-            x = (base[q, 0] + i) % nx
-            for j in range(points):
-                y = (base[q, 1] + j) % ny
-                for k in range(points):
-                    z = (base[q, 2] + k) % nz
-                    field[0, x, y, z] = 0.0
-                    field[1, x, y, z] = 0.0
-                    field[2, x, y, z] = 0.0
-
-
-@njit(cache=True)
 def interpolate(base, weights, field):
     """The values (n, 3) of field (3, nx, ny, nz) at the nodes: the transpose of ``spread``."""
     n, _, p = weights.shape

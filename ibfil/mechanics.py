@@ -104,10 +104,6 @@ class Mechanics:
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         return measure(self.mesh, np.ascontiguousarray(r), normal)
 
-    def measure(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
-        """Strains and spacing of r and e1 (n, 3), e1 as it is."""
-        return measure(self.mesh, r, e1)
-
     def move(self, start: Geometry, y: np.ndarray) -> Geometry:
         """The configuration displaced by y (n, m) from ``start``, e1 carried along and turned."""
         shape, least, where = moved(self.mesh, start, y)

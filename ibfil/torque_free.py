@@ -114,10 +114,6 @@ class TorqueFree(Mechanics):
         normal = e1 - _dot(e1, e3)[:, None] * e3
         return measure(self.mesh, r, normal / np.sqrt(_dot(normal, normal))[:, None])
 
-    def measure(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
-        """Strains and spacing of r and e1 (n, 3), e1 as it is."""
-        return measure(self.mesh, r, e1)
-
     def move(self, start: Geometry, y: np.ndarray) -> Geometry:
         """The configuration displaced by y (n, m) from ``start``, e1 carried along and turned."""
         r = start.r + y[:, :3]

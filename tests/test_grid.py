@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibfil.grid import Grid, cells_for, clear, interpolate, project, spread
+from ibfil.grid import Grid, cells_for, interpolate, project, spread
 from ibfil.kernels import KERNELS
 
 KERNEL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
@@ -134,19 +134,6 @@ def test_one_node_is_spread_over_the_points_around_it_with_the_products_of_its_w
         assert out[(1, *index)] == pytest.approx(expected, abs=1e-13)
     assert not out[0].any()
     assert not out[2].any()
-
-
-@CELLS
-def test_clearing_zeros_what_spreading_wrote_and_nothing_else(cells):
-    grid, kernel = grid_of(cells), KERNELS["bkp6"]
-    base, weights = kernel.stencil(grid.coordinates(scattered(grid, 6)))
-    touched = np.zeros((3, *cells))
-    spread(base, np.ones_like(weights), np.ones((6, 3)), touched)
-    field = np.random.default_rng(7).standard_normal((3, *cells))
-    before = field.copy()
-    clear(base, kernel.points, field)
-    assert not field[touched > 0].any()
-    assert np.array_equal(field[touched == 0], before[touched == 0])
 
 
 # --- the solve, mode by mode -----------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from thermal_scenes import BENT, ROD, USUAL, blocks, scene, walk
 from ibfil import banded, rft
 from ibfil.case import parse_case
 from ibfil.dimensionless import groups
+from ibfil.geometry import measure
 from ibfil.simulation import Simulation
 
 # --- the kicks ----------------------------------------------------------------------------------------------------
@@ -68,7 +69,7 @@ def test_the_drift_is_kt_times_the_divergence_of_the_mobility(rod, directions):
         """Column a of node i's mobility, at positions r."""
         unit = np.zeros((len(r), 4))
         unit[i, a] = 1.0
-        return rft.mobilize(drag, simulation.mechanics.measure(r, shape.e1).e3, unit)[i, :3]
+        return rft.mobilize(drag, measure(simulation.mechanics.mesh, r, shape.e1).e3, unit)[i, :3]
 
     expected = np.zeros_like(shape.r)
     free = np.setdiff1d(np.arange(4 * len(shape.r)), simulation.mechanics.ends.index)
@@ -246,7 +247,7 @@ def test_a_rod_that_does_not_twist_beside_one_that_does_is_not_turned():
 def test_a_soft_round_rod_without_twist_may_turn_its_frame_at_will():
     """Its e1 is carried along as kicks turn the tangents, differently from node to node; that is no twist."""
     simulation = Simulation(scene({"rod": ROD}, 0.1))
-    twisted = simulation.mechanics.measure(simulation.shape.r, np.tile([[0, 0, 1.0], [0, 1.0, 0]], (5, 1))[:9])
+    twisted = measure(simulation.mechanics.mesh, simulation.shape.r, np.tile([[0, 0, 1.0], [0, 1.0, 0]], (5, 1))[:9])
     simulation.state_now = simulation.state_now._replace(shape=twisted)
     walk(simulation, 1)
     assert np.max(np.abs(simulation.shape.twist)) > 0
