@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_navier_stokes import fluid
+from inertial_fluid import fluid
 
 from ibfil.assemble_inertia import flow_parts
 from ibfil.budget import memory
