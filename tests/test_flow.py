@@ -162,3 +162,11 @@ def test_a_fluid_with_inertia_knows_the_time_of_its_flow_in_steps_of_any_length(
     assert simulation.steps == 3
     assert simulation.fluid.time == pytest.approx(0.025, rel=1e-13)
     assert simulation.fluid.past.dt_old == pytest.approx(0.005, rel=1e-12)
+
+
+def test_a_maintained_flow_has_no_pressure_of_its_own() -> None:
+    """What drives it carries it: the pressure is that of the rods' disturbance, and these hardly push."""
+    vortices = ["sin(pi*x)*cos(pi*y)", "-cos(pi*x)*sin(pi*y)", "0"]  # alone they have rho/4 (cos 2 pi x + cos 2 pi y)
+    fluid = {**STOKES, "model": "navier-stokes", "density": 1.0, "flow": vortices}
+    simulation = run(scene({"rod": {**ROD, "bending": 1e-8, "stretching": 1e-8}}, fluid, end=0.04, step=0.01))
+    assert np.abs(simulation.frame(("pressure",)).grid["pressure"]).max() < 1e-6

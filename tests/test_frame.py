@@ -142,6 +142,16 @@ def test_a_spun_clamp_holds_e1_at_cos_wt_y_plus_sin_wt_z(scheme: str, fluid: dic
     assert np.array_equal(simulation.shape.r[node], Simulation(simulation.case).shape.r[node])
 
 
+@pytest.mark.parametrize("fluid", [RFT, STOKES], ids=["rft", "stokes"])
+@pytest.mark.parametrize(("at", "node"), [("start", 0), ("finish", -1)])
+def test_a_spun_clamp_gives_the_fluid_the_torque_of_its_own_drag(fluid: dict, at: str, node: int) -> None:
+    """4 pi eta a^2 w over half a segment, by BDF2 in steps of any length."""
+    simulation = spun({"spin": 5.0}, fluid=fluid, at=at)
+    simulation.advance(0.36, lambda: None)
+    torque = simulation.frame().filaments["rod"].torque[node]
+    assert torque == pytest.approx(4 * np.pi * 0.05**2 * 5.0 / 16 * X, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("end", "angle"),
     [

@@ -40,10 +40,10 @@ every = 0.1
     ("numbers", "kind"),
     [
         ({}, "stable"),
-        ({"place": 0.06}, "wrong"),
-        ({"place": 0.06, "turn": 0.2}, "turned"),
-        ({"place": 0.06, "turn": 0.2, "force": 20.0}, "locked"),
-        ({"place": 0.06, "turn": 0.2, "force": 20.0, "stretch": 0.03}, "stretched"),
+        ({"place": 0.051}, "wrong"),
+        ({"place": 0.06, "turn": 0.101}, "turned"),
+        ({"place": 0.06, "turn": 0.2, "force": 10.1}, "locked"),
+        ({"place": 0.06, "turn": 0.2, "force": 20.0, "stretch": 0.0201}, "stretched"),
         ({"place": 0.049, "turn": 0.099, "force": 9.9, "stretch": 0.0199}, "stable"),
     ],
 )
