@@ -112,14 +112,14 @@ def fluid(case: Case, stacked: Stacked) -> tuple[Fluid, str, Grid | None]:
     if case.fluid.model == "navier-stokes":
         from .assemble_inertia import navier_stokes
 
-        return navier_stokes(case, made, method, _worth(case, stacked, grid)), method, grid
+        return navier_stokes(case, made, method, _factor_cost(case, stacked, grid)), method, grid
     if method == "table":
         return stokes.StokesByTable(made), method, grid
     if method == "averaged":
         return stokes.StokesByAverage(made), method, grid
     solver = _solver(case, stacked, grid, method)
     if method == "krylov":
-        return stokes.StokesByKrylov(made, solver, _worth(case, stacked, grid)), method, grid
+        return stokes.StokesByKrylov(made, solver, _factor_cost(case, stacked, grid)), method, grid
     return stokes.StokesByFFT(made, solver), method, grid
 
 
@@ -167,7 +167,7 @@ def method_seconds(case: Case, stacked: Stacked, grid: Grid | None) -> dict[str,
     return costs.seconds_a_step(case, rods, cells, sizes, assemble_grid.parts(case))
 
 
-def _worth(case: Case, stacked: Stacked, grid: Grid) -> float:
+def _factor_cost(case: Case, stacked: Stacked, grid: Grid) -> float:
     """What factoring the rods' own systems costs, in velocity evaluations."""
     evaluation = costs.evaluation(grid.cells.tolist(), _box(case, stacked, grid), len(stacked.s))
     parts = assemble_grid.parts(case)

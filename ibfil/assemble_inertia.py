@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from .separation import Product
 
 
-def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> NavierStokes:
+def navier_stokes(case: Case, made: Immersed, method: str, factor_cost: float) -> NavierStokes:
     """The fluid, its forces answered by ``method``; what transforms whole fields shares one room for it.
 
-    ``worth``: what a preconditioner of krylov costs, in velocity evaluations.
+    ``factor_cost``: what a preconditioner of krylov costs, in velocity evaluations.
     """
     threads = case.compute.threads
     room = Room(made.grid, made.coupling.vectors, threads, made.number)
@@ -36,7 +36,7 @@ def navier_stokes(case: Case, made: Immersed, method: str, worth: float) -> Navi
         else:
             solver = TorqueStokesSolve(made.grid, made.viscosity, threads, alpha, shared)
         if method == "krylov":
-            return stokes.StokesByKrylov(made, solver, worth, alpha)
+            return stokes.StokesByKrylov(made, solver, factor_cost, alpha)
         return stokes.StokesByFFT(made, solver, alpha)
 
     assert case.fluid.density is not None

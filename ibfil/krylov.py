@@ -19,7 +19,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
 _CYCLE = 60  # vectors GMRES keeps
 _DRIFT = 0.4  # of tau, by which a kept preconditioner may be off: less than the change from Euler to BDF2
-_TRIAL = 8  # preconditioners, of which one is kept for longer than the others were worth it
+_TRIAL = 8  # of so many preconditioners one is kept for longer, to find how long they serve
 
 Product = Callable[[np.ndarray], np.ndarray]
 
@@ -106,20 +106,21 @@ def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float,
     return Solution(blocks.scale * z, count, found)
 
 
-_COUNTS = ("tau", "age", "before", "now", "fresh", "life", "made")  # of a Kept, that a run's state holds
+_COUNTS = ("tau", "age", "before", "now", "fresh", "life", "made")  # of KeptFactors, that a run's state holds
 
 
 @dataclass
-class Kept:
-    """A preconditioner that is kept from step to step, what it has cost, and how long its like have served.
+class KeptFactors:
+    """A preconditioner that is kept from step to step, what it has cost, and for how long those before it served.
 
-    A step's solves after the first are near its solution, and so is the first of the next step: factors made at a
-    second solve serve these. They are kept for as many rounds of such solves as cost less than the mean round since
-    they were made, their making (``worth`` products) included: from there on the mean would grow. How many rounds that
-    is is remembered, and tried again every eighth time. Counts decide, never a clock.
+    A round is the solves of a step after its first, and the first of the next step: all are near one solution, and
+    factors made at a step's second solve serve them. Factors are kept for as long as a round takes fewer products than
+    the mean round since they were made, where that counts what making them cost (``cost``, in products): beyond it the
+    mean would grow. The number of rounds found so (``life``) holds for the next factors, and every eighth are kept for
+    longer, to find it anew. Counts decide, never a clock.
     """
 
-    worth: float
+    cost: float
     blocks: Blocks | None = None
     tau: float = 0.0
     age: int = 0  # rounds ended since it was made
@@ -136,7 +137,7 @@ class Kept:
 
     def end_round(self) -> bool:
         """Ends a round of solves; whether the factors should be made anew for the next."""
-        mean = (self.worth + self.before) / max(1, self.age)
+        mean = (self.cost + self.before) / max(1, self.age)
         self.age += 1
         self.before += self.now
         spent, self.now = self.now, 0
@@ -155,7 +156,7 @@ class Kept:
     @property
     def patience(self) -> int:
         """The products after which a solve is better gone on with by new factors."""
-        return self.fresh + int(min(_CYCLE, self.worth + 10))
+        return self.fresh + int(min(_CYCLE, self.cost + 10))
 
     def took(self, solution: Solution) -> None:
         """Told what came of a solve."""

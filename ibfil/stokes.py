@@ -240,15 +240,15 @@ class _Source(NamedTuple):
 class StokesByKrylov(StokesByFFT):
     """IB Stokes for many nodes: GMRES on the FFT operator, preconditioned rod by rod, factors kept while they serve.
 
-    ``worth`` is what making them costs, in products. What they were made from is part of a run's state, so that a
+    ``cost`` is what making them costs, in products. What they were made from is part of a run's state, so that a
     resumed run has the same ones.
     """
 
     keeps = False
 
-    def __init__(self, fluid: Immersed, solver: Solver, worth: float, alpha: float = 0.0) -> None:
+    def __init__(self, fluid: Immersed, solver: Solver, cost: float, alpha: float = 0.0) -> None:
         super().__init__(fluid, solver, alpha)
-        self._kept = krylov.Kept(worth)
+        self._kept = krylov.KeptFactors(cost)
         self._loose = _LOOSE if fluid.coupling.vectors == 1 else _STIRRED * _LOOSE
         self._source: _Source | None = None
 

@@ -199,7 +199,7 @@ def _rounds(kept, products):
 
 
 def test_a_preconditioner_is_kept_while_that_is_cheaper_than_the_mean():
-    kept = krylov.Kept(100.0)
+    kept = krylov.KeptFactors(100.0)
     kept.renew(krylov.Blocks([], np.ones(0)), 1.0)
     assert kept.fits(0.8)
     assert not kept.fits(0.5)
@@ -210,7 +210,7 @@ def test_a_preconditioner_is_kept_while_that_is_cheaper_than_the_mean():
 
 
 def test_a_preconditioner_that_serves_once_is_made_each_round_but_for_a_trial():
-    kept = krylov.Kept(5.0)
+    kept = krylov.KeptFactors(5.0)
     kept.renew(krylov.Blocks([], np.ones(0)), 1.0)
     made = []
     for _ in range(12):
