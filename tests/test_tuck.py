@@ -12,16 +12,21 @@ other, an error of first order in h that is extrapolated away.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from ibfil.case import read_case
 from ibfil.fluid import Held
 from ibfil.grid import Grid
 from ibfil.immersed_boundary import Immersed
 from ibfil.kernels import KERNELS
 from ibfil.navier_stokes import NavierStokes, Room
+from ibfil.simulation import Simulation
 from ibfil.stokes import StokesByTable
 
+CASE = Path(__file__).parents[1] / "cases/inertia/pumping_sheets.toml"
 TALL, AMPLITUDE = 2, 0.05  # H in wavelengths, k b
 
 
@@ -71,3 +76,23 @@ def test_a_sheet_pumps_as_tuck_says(reynolds, periods):
 def test_a_sheet_pumps_as_tuck_says_the_better_the_finer(reynolds, periods):
     """Tuck's factor is 1, 0.955, 0.812, 0.713; twice as fine as above, in space and in time."""
     assert extrapolated(reynolds, 64, periods, 64) == pytest.approx(tuck(reynolds), rel=0.015)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("reynolds", "periods"), [(1e-3, 3), (1.0, 4), (4.0, 5)])
+def test_the_shipped_sheets_push_as_tuck_says(reynolds, periods):
+    """The case's two sheets of rods, each held by tethers, without the kernel's thickness: 8 h U a rod."""
+
+    def speed(cells):
+        end, h = 2 * np.pi * periods, 2 * np.pi / cells
+        case = read_case(CASE, [f"parameters.n={cells}", f"parameters.R={reynolds}", f"time.end={end}"])
+        simulation, pushes = Simulation(case), []
+        simulation.advance(end - 2 * np.pi, lambda: None)
+        for k in range(1, 65):
+            simulation.advance(end - 2 * np.pi * (1 - k / 64), lambda: None)
+            frame = simulation.frame().filaments["to_right"]
+            pushes.append(frame.force[:, 0].sum())
+        return float(np.mean(pushes)) / (8 * h)
+
+    taylor = 0.5 * AMPLITUDE**2
+    assert 2 * speed(64) - speed(32) == pytest.approx(taylor * tuck(reynolds), rel=0.03)
