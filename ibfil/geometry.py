@@ -134,6 +134,46 @@ def _moved(mesh: Mesh, start, y):
     return g, least, where
 
 
+@njit(cache=True)
+def _replace(first, last, held, y, out):
+    """Shifts nodes first .. last of ``out`` so that held ends are where y has them, or else the mean of the nodes."""
+    off = plus(at(y, last, 0), -1.0, at(out, last, 0))
+    if not held[first] and not held[last]:
+        off = (0.0, 0.0, 0.0)
+        for i in range(first, last + 1):
+            off = plus(off, 1.0 / (last + 1 - first), plus(at(y, i, 0), -1.0, at(out, i, 0)))
+    for i in range(first, last + 1):
+        if not held[first]:
+            put(out, i, 0, plus(at(out, i, 0), 1.0, off))
+        elif held[last]:
+            put(out, i, 0, plus(at(out, i, 0), (i - first) / (last - first), off))
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(joined, start, held, y):
+    out = y.copy()
+    first = 0
+    for i in range(y.shape[0]):
+        if joined[i]:
+            gap = at(start, i, GAP)
+            new = plus(gap, 1.0, plus(at(y, i + 1, 0), -1.0, at(y, i, 0)))
+            change = plus(scaled(start[i, LENGTH] / np.sqrt(dot(new, new)), new), -1.0, gap)
+            put(out, i + 1, 0, plus(at(out, i, 0), 1.0, change))
+        else:
+            _replace(first, i, held, y, out)
+            first = i + 1
+    return out
+
+
+def turned(mesh: Mesh, start: Geometry, held: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Displacements (n, m) that turn every segment as y (n, m) does and leave it as long as it is in ``start``.
+
+    The nodes' mean, or those ends that are ``held`` (n,), are where y has them; between two of these the rest is shared
+    out along the filament.
+    """
+    return _turned(mesh.joined, start.table, held, y)
+
+
 def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Geometry:
     """Strains and spacing of the configuration r, e1 (n, 3); e1 is taken as normal to the stencils' tangents."""
     return Geometry(_measured(mesh, r, e1))

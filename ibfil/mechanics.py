@@ -13,7 +13,7 @@ import numpy as np
 from . import banded, elasticity
 from .elasticity import Moment
 from .fluid import Held
-from .geometry import Geometry, measure, moved, tangents
+from .geometry import Geometry, measure, moved, tangents, turned
 from .mesh import Mesh
 from .variation import Variation
 
@@ -96,6 +96,8 @@ class Mechanics:
         self._matrix_shape = (len(free), unknowns, (2 * self.profile.width + 1) * unknowns)
         self._stencils = elasticity.stencils(mesh)
         self._zero = np.zeros(len(free))
+        self._held = np.zeros(len(free), bool)
+        self._held[ends.index[ends.index % unknowns < 3] // unknowns] = True
 
     def start(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
         """The configuration r (n, 3) with e1 (n, 3) made normal to the stencils' tangents."""
@@ -110,6 +112,10 @@ class Mechanics:
         if not least > REVERSED:
             raise TangentReversed(where, least)
         return shape
+
+    def turned(self, start: Geometry, y: np.ndarray) -> np.ndarray:
+        """Displacements (n, m) that turn every segment as y does and do not stretch it."""
+        return turned(self.mesh, start, self._held, y)
 
     def moment(self, shape: Geometry, time: float) -> Moment:
         """The law's moments, zero at free ends."""

@@ -53,6 +53,9 @@ class Rods(Protocol):
     def move(self, start: Geometry, y: np.ndarray) -> Geometry:
         """The configuration displaced by y from ``start``."""
 
+    def turned(self, start: Geometry, y: np.ndarray) -> np.ndarray:
+        """Displacements that turn every segment as y does and do not stretch it."""
+
     def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Any]:
         """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""
 
@@ -176,8 +179,10 @@ class Implicit:
 
     M is taken at the extrapolated positions. Newton's iteration is tried from three starts, until one converges:
 
-    1. from the extrapolated positions, for as long as corrections shrink fast; the matrix of the iteration before
-       serves again where the fluid keeps its factors and the last correction shrank by ``again``;
+    1. from near the extrapolated positions, for as long as corrections shrink fast. Segments keep their length there:
+       extrapolated ones are stretched by half the square of their turn, against which a stiff rod pulls so hard that
+       the linear answer is far off. The matrix of the iteration before serves again where the fluid keeps its factors
+       and the last correction was small, ``again`` of what it corrected;
     2. from the start of the step, compressive geometric stiffness left out of the matrix in the first iteration, and
        in any whose correction would be four times the last one without that;
     3. as 2, but from the extrapolated positions and with corrections cut so that no segment changes by more than
@@ -188,7 +193,7 @@ class Implicit:
     tolerance: float = 1e-8  # largest correction of a node: of the length, and in radians of its turn
     most: int = 12  # iterations, each time
     stride: float = 0.1  # of a segment
-    again: float = 0.15  # of the correction before
+    again: tuple[float, float] = (0.3, 0.08)  # a first correction of the displacement, others of the one before
 
     def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
         """Newton to ``tolerance``. Raises one of FAILURES, NotConverged after ``most`` iterations among them."""
@@ -211,7 +216,8 @@ class Implicit:
         """Newton from wherever it converges; ``ahead`` are the extrapolated displacements, to ``there``."""
         if ahead.any():
             try:
-                return self._quickly(equation, ahead, there)
+                y = equation.rods.turned(equation.start, ahead)
+                return self._quickly(equation, y, equation.rods.move(equation.start, y))
             except FAILURES:
                 pass
         try:
@@ -220,24 +226,27 @@ class Implicit:
             return self._newton(equation, ahead, there, self.stride)
 
     def _quickly(self, equation: _Equation, y: np.ndarray, shape: Geometry) -> tuple[np.ndarray, Answer, int]:
-        """From y, where the rods have ``shape``, to the solution, while corrections halve at least, then quarter.
+        """From y, where the rods have ``shape``, to the solution, while corrections shrink, exact ones to a quarter.
 
         Where they shrink more slowly another solution may be on the way, as where a soft rod kinks.
         """
-        rods, last, rate, exact = equation.rods, _size(y, equation.rods.length), np.inf, 0
+        rods, last, rate, exact, fresh = equation.rods, _size(y, equation.rods.length), np.inf, 0, False
         for count in range(1, self.most + 1):
             force, inner = rods.forces(shape, equation.time)
-            if rate > self.again or not equation.response.keeps:
+            before, fresh = fresh, rate > self.again[count > 2] or not equation.response.keeps
+            if fresh:
                 matrix = rods.stiffness(shape, equation.start, inner, equation.time)
                 exact += 1
             answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
             size = _size(answer.move, rods.length)
             rate = size / max(last, self.tolerance)
-            if not rate < (0.5 if count <= 2 else 0.25):
+            if not rate < (0.25 if fresh and before else 1.0):
                 break
             y = y + answer.move
-            # An exact matrix squares the error, a matrix of before takes the same part of it each time.
-            coming = size * rate**2 if exact == count > 1 else size * rate if count > 1 else size
+            # Exact matrices square the error, by a factor that settles after the first; a matrix that serves again
+            # takes the same part of it each time, which it has to show once.
+            known = 10 * rate**2 if exact == count > 2 else 1.0 if before and not fresh else rate
+            coming = size * known if count > 1 else size
             if coming < self.tolerance:
                 return y, answer, count
             shape, last = rods.move(equation.start, y), size
