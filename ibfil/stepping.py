@@ -263,7 +263,6 @@ class Implicit:
         for count in range(1, self.most + 1):
             answer, size = equation.correction(y, shape, rods.stiffness if exact else rods.definite_stiffness)
             if exact and not size <= 4 * last:
-                exact = False
                 answer, size = equation.correction(y, shape, rods.definite_stiffness)
             if not np.isfinite(size):
                 break
