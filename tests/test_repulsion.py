@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from contact_scenes import GRID, case, crossed, ran
-from test_segments import suspension
+from test_contact_search import suspension
 
 from ibfil.contact import Contact
 from ibfil.contact_search import Segments
