@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -246,7 +247,8 @@ def pvpython() -> list[str]:
         pytest.skip("pvpython is not installed: ParaView itself has not read these files")
     if not shutil.which("xvfb-run"):
         pytest.skip("xvfb-run is not installed: pvpython cannot save pictures here")
-    return ["xvfb-run", "-a", found]
+    # -a alone lets two that start at once take one display.
+    return ["xvfb-run", "-a", "-n", str(100 + os.getpid() % 30000), found]
 
 
 def test_paraview_itself_reads_tubes_and_traces(collection, tmp_path):
@@ -280,6 +282,7 @@ SaveScreenshot({str(tmp_path / "look.png")!r}, view)
 """
     )
     done = subprocess.run([*pvpython(), script], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
     told = dict(line.split(" ", 1) for line in done.stdout.splitlines() if " " in line)
     assert told["times"] == "0.0 0.25 0.5 0.75 1.0", done.stderr
     assert eval(told["y"]) == (2.25, 2.25)  # SPEED * 0.75
