@@ -190,7 +190,7 @@ SAME_RADIUS = {"roma3": (96, -0.0434), "peskin4": (128, -0.0437), "es5": (132, -
 @pytest.mark.parametrize(
     "name", ["roma3", "peskin4", *(pytest.param(k, marks=pytest.mark.slow) for k in ("es5", "bkp6"))]
 )
-def test_kernels_of_the_same_radius_swim_alike(name):
+def test_kernels_of_the_same_radius_swim_alike(name, slip_alike):
     cells, speed = SAME_RADIUS[name]
     assert swim(41, cells, 400.0, 0.01, kernel=name).speed == pytest.approx(speed, rel=0.005)
 
