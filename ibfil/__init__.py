@@ -33,7 +33,7 @@ Modules by what they are about; a common first word means one subject:
                   assemble_loads assemble_contact assemble_profiles assemble_fluid assemble_grid assemble_inertia
                   costs
     running       simulation running loop schedule progress failures errors threads
-    results       frames diagnostics record recorder journal checkpoint examine units observe observables
+    results       frames diagnostics record recorder provenance journal checkpoint examine units observe observables
                   observables_fitted observables_place time_series stops expectations energy recorded_flow analysis
     commands      cli cli_studies check dimensionless scene_warnings budget show show_figure vtk vtk_data vtk_scene
                   render render_stage render_streamlines render_lettering render_viewpoint wrapping figure_style

@@ -8,13 +8,9 @@ called).
 from __future__ import annotations
 
 import contextlib
-import json
-import platform
 import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields as fields_of
-from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,12 +18,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import h5py
 import numpy as np
 
-from . import __version__
 from .errors import RunFailed
 from .frames import Frame
 from .journal import Busy, JournaledFile
 from .progress import pace_of
-from .record import FORMAT, FORMAT_VERSION, RunFileError, checkpoint_path, journal_path
+from .provenance import about, now
+from .record import RunFileError, checkpoint_path, journal_path
 from .units import label
 
 if TYPE_CHECKING:
@@ -36,7 +32,6 @@ if TYPE_CHECKING:
 _CHUNK = 32768  # bytes: the part of a dataset that an append rewrites
 _PAUSE = 1.0  # seconds between two writes, or _SHARE times what the last one took
 _SHARE = 50
-_LIBRARIES = ("numpy", "scipy", "numba", "pyfftw", "h5py")
 
 # Dataset -> its dimension (units.py) and description.
 _FILAMENT = {
@@ -135,7 +130,7 @@ class Recorder:
             checkpoint_path(path).unlink(missing_ok=True)  # before the run it belongs to
             file.clear()
             self._h5 = h5py.File(file, "w")
-            self._h5.attrs.update(_about(case, method, wisdom, groups))
+            self._h5.attrs.update(about(case, method, wisdom, groups))
             for group in ("filaments", "observables", "diagnostics"):
                 self._h5.create_group(group)
             for name, value in _rows(frame, series).items():
@@ -236,7 +231,7 @@ class Recorder:
 
     def finish(self, status: str, reason: str = "", **attributes: Any) -> None:
         """Write what waits and how the run ended, and close the file."""
-        self.write(status=status, reason=reason, finished=_now(), **attributes)
+        self.write(status=status, reason=reason, finished=now(), **attributes)
         self.close()
 
     def close(self) -> None:
@@ -299,7 +294,7 @@ def record_end(path: Path, status: str, reason: str) -> None:
         file = JournaledFile(path, journal_path(path))
         try:
             h5 = h5py.File(file, "r+")
-            h5.attrs.update(status=status, reason=reason, finished=_now())
+            h5.attrs.update(status=status, reason=reason, finished=now())
             h5.flush()
             file.commit()
             h5.close()
@@ -374,36 +369,3 @@ def _meaning(name: str, observables: Mapping[str, Meaning]) -> Meaning:
     if group == "diagnostics":
         return Meaning(*_DIAGNOSTICS.get(last, ("1", last.replace("_", " "))))
     return Meaning(*_FILAMENT[last])
-
-
-def versions() -> dict[str, str]:
-    """Versions of ibfil, Python and the libraries that results depend on."""
-    found = {"ibfil": __version__, "python": platform.python_version()}
-    for library in _LIBRARIES:
-        with contextlib.suppress(metadata.PackageNotFoundError):
-            found[library] = metadata.version(library)
-    return found
-
-
-def _about(case: Case, method: str, wisdom: str, groups: Mapping[str, float]) -> dict[str, Any]:
-    """Return the attributes of a run that begins."""
-    return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "ibfil_version": __version__,
-        "case": case.text,
-        "created": _now(),
-        "finished": "",
-        "versions": json.dumps(versions()),
-        "method": method,
-        "wisdom": wisdom,
-        "groups": json.dumps(dict(groups)),
-        "status": "running",
-        "reason": "",
-        "steps": 0,
-        "wall_time": 0.0,
-    }
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

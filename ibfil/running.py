@@ -11,8 +11,9 @@ from .case import differences, parse_case, read_case, written
 from .errors import CaseError
 from .loop import Loop, Result
 from .observe import Observable, Observers, observers
+from .provenance import versions
 from .record import RunFile, RunFileError, checkpoint_path, journal_path
-from .recorder import refuse_existing, versions
+from .recorder import refuse_existing
 from .stops import StopRules
 
 if TYPE_CHECKING:

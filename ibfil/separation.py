@@ -86,7 +86,10 @@ def _of_a_sum(op: str, argument: Tree) -> list[_Term] | None:
     """sin or cos of a(x, y, z) + b(t)."""
     a: Tree = 0.0
     b: Tree = 0.0
-    for f, g in _terms(argument) or [_Term("t", "x")]:
+    terms = _terms(argument)
+    if terms is None:
+        return None
+    for f, g in terms:
         if f == 1.0:
             a = ("+", a, g)
         elif not of_tree(g).variables:

@@ -210,7 +210,7 @@ def _finite(value: Any) -> Any:
 
 def measured() -> dict[str, Any]:
     """When, with which versions and on what kind of machine something was measured."""
-    from .recorder import versions
+    from .provenance import versions
 
     return {
         "date": datetime.now(UTC).date().isoformat(),

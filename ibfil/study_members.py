@@ -214,7 +214,7 @@ def _standing(member: Member, folder: Path, say: Say) -> Outcome:
 
 def _known(reason: str, versions: dict[str, str]) -> bool:
     """Whether a failure is the scene's own and would come again, bit for bit: not a full disk, say."""
-    from .recorder import versions as present
+    from .provenance import versions as present
 
     return reason.startswith("the run stopped") and "cannot be written" not in reason and versions == present()
 

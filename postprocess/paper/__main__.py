@@ -14,7 +14,7 @@ from pathlib import Path
 import matplotlib
 
 from ibfil.errors import CaseError, Interrupted
-from ibfil.recorder import versions
+from ibfil.provenance import versions
 from ibfil.study_members import Member, run_members
 
 from .drawing import STYLE
