@@ -4,47 +4,32 @@ From Python, ``ibfil.run("case.toml")`` does what ``ibfil run case.toml`` does a
 it wrote. The names below are looked up when they are first used, so that ``import ibfil`` and the command line's help
 cost nothing.
 
-Where to read. A run in the order of its files, each handing what it makes to the next; the step is the indented part:
+Where to read. The packages stand in this order from the ground up; each imports only what stands before it, and each
+has a README.md with its equations, its files in reading order, and how to add another of its kind:
 
-    case          a TOML file -> a checked description of the scene; nothing is made yet
-    assemble      -> the rods stacked, their law, ends and loads; assemble_fluid: the fluid
-    simulation    the present state, and how it goes on; marching: how long the steps are
-        stepping      y = target + tau (u0 + M (f(y) + R)), explicit, semi-implicit or by Newton's iteration
-        mechanics     what the rods answer: the force f of a configuration, and its stiffness K
-        geometry      positions, e1 -> r', r'', frame, strains, spacing
-        laws          strains -> moments (Eq. 9)
-        elasticity    moments -> nodal forces (Eq. 44), and their exact Jacobian
-        fluid         what the fluid answers: u = u0 + M F, in rft, stokes or navier_stokes
-    diagnostics   the state -> a frame (frames): what one output holds
-    loop          frames -> recorder (the run file), observe (its numbers), stops
+    linalg         band matrices by node, small blocks, GMRES
+    grid           the periodic grid: kernels, spreading, transforms, the solve mode by mode
+    rods           strains, laws, the force of Eq. 44 and its Jacobian, loads, contact: `system` is the whole
+    fluids         u = u0 + M F over a step: resistive-force theory, Stokes and Navier-Stokes on the grid
+    timestepping   y = target + tau (u0 + M (f(y) + R)): explicit, semi-implicit, implicit, thermal; step control
 
-Modules by what they are about; a common first word means one subject:
+    case           what a scene may say: the TOML file, checked
+    io             the run file, its checkpoint and journal
+    observables    the numbers of a run
+    shapes         how filaments begin
+    assembly       a case -> rods, loads, laws, and its fluid (one class a model)
+    simulation     the present state, and the one time loop
+    check          what is told before a run: groups, costs, warnings
+    running        a run from its start, or on from a checkpoint
+    analysis, visualization, bench, studies, commands      what is made of runs
 
-    rods          mesh geometry directors laws elasticity torque_free variation ends loads contact contact_search
-                  thermal mechanics
-    fluids        fluid rft matched_drag immersed_boundary condensation stokes krylov pruned mobility
-                  mobility_averaged torque_coupling navier_stokes past advection slab grid kernels transforms fields
-                  fields_inertia
-    time          stepping marching timescales
-    algebra       vectors blocks banded
-    scene         case case_schema case_filament case_values case_checks case_checks_filament case_checks_planar
-                  case_checks_size case_faults case_listing case_overrides expressions separation shapes
-                  shape_curves shape_points shape_from_run shape_placing shape_copies assemble assemble_laws
-                  assemble_loads assemble_contact assemble_profiles assemble_fluid assemble_grid assemble_inertia
-                  costs
-    running       simulation running loop schedule progress failures errors threads
-    results       frames diagnostics record recorder provenance journal checkpoint examine units observe observables
-                  observables_fitted observables_place time_series stops expectations energy recorded_flow analysis
-    commands      cli cli_studies check dimensionless scene_warnings budget show show_figure vtk vtk_data vtk_scene
-                  render render_stage render_streamlines render_lettering render_viewpoint wrapping figure_style
-                  verify shipped
-    studies       study study_members study_workers study_distance sweep compare compare_quantities compare_figure
-                  trade trade_reference trade_figure stability stability_figure
-    speed         bench bench_many bench_threads
+A step reads downwards: simulation.Simulation.advance -> timestepping (a scheme) -> rods.system (force, stiffness) and
+fluids (a response, its solve) -> grid, linalg.
 
-Equations are numbered as in Ryan & Wolgemuth, J. Comput. Phys. 466, 111375 (2022): Eq. 9 is in laws, 15 and 39 in
-geometry, 16, 17 and 48 in rft, 36 and 44 in elasticity, 41 in directors, 45 in immersed_boundary, 53 in thermal; what
-is misprinted stands corrected in elasticity, loads and thermal, which say so. Symbols are the paper's: r position, e1,
+Equations are numbered as in Ryan & Wolgemuth, J. Comput. Phys. 466, 111375 (2022): Eq. 9 is in
+rods/constitutive, 15 and 39 in rods/geometry, 41 in rods/frame, 36 and 44 in rods/elastic_force, 16, 17 and 48 in
+fluids/resistive_force, 45 in fluids/immersed_boundary, 53 in timestepping/brownian; what is misprinted stands corrected
+there, which say so. Symbols are the paper's: r position, e1,
 e2, e3 frame (e3 the tangent), O1, O2, O3 strains (its Omega), k1, k2, tau0 the preferred ones, A1, A2, C, EA moduli, M
 moment, F force through a segment, f force on a node, s arclength, ds spacing, zeta drag per length, eta viscosity, rho
 density, h spacing of the grid, dt step. tau is the effective length of a step, w = dt/dt_old.
@@ -55,33 +40,35 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from .analysis import Run
-    from .analysis import open_run as open
-    from .case import Case, parse_case, read_case
-    from .errors import CaseError, Interrupted, RunFailed
-    from .running import run
-    from .simulation import Simulation
-    from .study_members import Member, Outcome, run_members
-    from .vtk import write_vtk
+from .version import __version__
 
-__version__ = "0.1.0"
+if TYPE_CHECKING:
+    from .analysis.run import Run
+    from .analysis.run import open_run as open
+    from .case.reading import parse_case, read_case
+    from .case.schema import Case
+    from .errors import CaseError, Interrupted, RunFailed
+    from .running.run import run
+    from .simulation.simulation import Simulation
+    from .studies.member import Member, Outcome
+    from .studies.members import run_members
+    from .visualization.vtk_files import write_vtk
 
 _HOME = {
-    "Case": "case",
-    "parse_case": "case",
-    "read_case": "case",
+    "Case": "case.schema",
+    "parse_case": "case.reading",
+    "read_case": "case.reading",
     "CaseError": "errors",
     "Interrupted": "errors",
     "RunFailed": "errors",
-    "Member": "study_members",
-    "Outcome": "study_members",
-    "run_members": "study_members",
-    "Run": "analysis",
-    "open": "analysis:open_run",
-    "run": "running",
-    "Simulation": "simulation",
-    "write_vtk": "vtk",
+    "Member": "studies.member",
+    "Outcome": "studies.member",
+    "run_members": "studies.members",
+    "Run": "analysis.run",
+    "open": "analysis.run:open_run",
+    "run": "running.run",
+    "Simulation": "simulation.simulation",
+    "write_vtk": "visualization.vtk_files",
 }
 
 __all__ = [

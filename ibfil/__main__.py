@@ -2,6 +2,6 @@
 
 import sys
 
-from ibfil.cli import main
+from ibfil.commands.main import main
 
 sys.exit(main())

@@ -48,6 +48,14 @@ class RunFailed(Exception):
         return "\n".join(lines)
 
 
+class StepFailed(Exception):
+    """A step that could not be taken; ``node`` is where, in the stack of all rods. It may be tried again, shorter."""
+
+    def __init__(self, message: str, node: int) -> None:
+        super().__init__(message)
+        self.node = node
+
+
 class Stopped(Exception):
     """A run that ends before its time because its case says so; the text is the reason (exit status 0)."""
 

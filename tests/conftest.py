@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from made_run import BENT
+from helpers.made_run import BENT
 
 
 @pytest.fixture
@@ -35,8 +35,8 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def uncut(tmp_path_factory) -> Path:
     """The fake case, run without a break."""
-    from fake_simulation import case
-    from runs import run
+    from helpers.fake_simulation import case
+    from helpers.runs import run
 
     path = tmp_path_factory.mktemp("uncut") / "uncut.h5"
     run(case(), path)

@@ -8,7 +8,7 @@ import inspect
 from pathlib import Path
 
 import pytest
-from made_run import BENT
+from helpers.made_run import BENT
 
 import ibfil
 
@@ -18,8 +18,10 @@ SHORT = ("time.end=0.002", "output.every=0.001")
 
 
 def modules_with_examples() -> list[str]:
+    """Names such as "rods.constitutive", of all modules that have examples."""
     folder = Path(ibfil.__file__).parent
-    return sorted(path.stem for path in folder.glob("*.py") if ">>> " in path.read_text())
+    found = [path for path in folder.rglob("*.py") if ">>> " in path.read_text()]
+    return sorted(".".join(path.relative_to(folder).with_suffix("").parts) for path in found)
 
 
 @pytest.fixture(scope="module")

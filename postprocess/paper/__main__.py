@@ -14,8 +14,9 @@ from pathlib import Path
 import matplotlib
 
 from ibfil.errors import CaseError, Interrupted
-from ibfil.provenance import versions
-from ibfil.study_members import Member, run_members
+from ibfil.io.provenance import versions
+from ibfil.studies.member import Member
+from ibfil.studies.members import run_members
 
 from .drawing import STYLE
 from .results import HEADINGS, Row, Runs, columns, markdown, plain

@@ -9,7 +9,7 @@ from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 if TYPE_CHECKING:
-    from ibfil.record import RunFile
+    from ibfil.io.reader import RunFile
 
 
 def first_below(series: np.ndarray, level: float) -> int:

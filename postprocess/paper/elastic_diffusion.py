@@ -18,10 +18,11 @@ import tomllib
 import numpy as np
 import tomli_w
 
-from ibfil.banded import dense
-from ibfil.case import Case, parse_case
-from ibfil.rft import resist
-from ibfil.simulation import Simulation
+from ibfil.case.reading import parse_case
+from ibfil.case.schema import Case
+from ibfil.fluids.resistive_force import resist
+from ibfil.linalg.banded import dense
+from ibfil.simulation.simulation import Simulation
 
 
 def diffusion_ratio(case: Case, lag: float) -> float:

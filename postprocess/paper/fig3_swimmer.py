@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil.study_members import Member
+from ibfil.studies.member import Member
 
 from . import finite_difference
 from .drawing import COLOURS, axes_labels, new_figure, stroboscopic

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil.study_members import Member
+from ibfil.studies.member import Member
 
 from .drawing import axes_labels, new_figure
 from .results import Row
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ibfil.record import RunFile
+    from ibfil.io.reader import RunFile
 
     from .results import Runs
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil.study_members import Member
+from ibfil.studies.member import Member
 
 from .drawing import COLOURS, TIME, axes_labels, new_figure
 from .helix_statics import Helix

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil import time_series
-from ibfil.study_members import Member
+from ibfil.observables import time_series
+from ibfil.studies.member import Member
 
 from . import fig7_panels as panels
 from .buckled import bending_mode, first_below, fold

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil import time_series
-from ibfil.study_members import Member
+from ibfil.observables import time_series
+from ibfil.studies.member import Member
 
 from .drawing import COLOURS, axes_labels, new_figure, stroboscopic
 from .results import Row
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ibfil.record import RunFile
+    from ibfil.io.reader import RunFile
 
     from .results import Runs
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ibfil.banded import Profile, solve
+from ibfil.linalg.banded import Profile, solve
 
 from .old_schemes import (
     REACH,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibfil.banded import Profile, solve
+from ibfil.linalg.banded import Profile, solve
 
 from .old_schemes import (
     REACH,

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ibfil.mesh import weights
-from ibfil.shapes import initial_shape
-from ibfil.study_members import Member
+from ibfil.linalg.finite_differences import weights
+from ibfil.shapes.initial import initial_shape
+from ibfil.studies.member import Member
 
 REACH = 6  # nodes a row of the band matrices reaches to either side
 

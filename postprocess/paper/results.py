@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ibfil.record import RunFile
-from ibfil.study_members import Outcome
+from ibfil.io.reader import RunFile
+from ibfil.studies.member import Outcome
 
 
 @dataclass(frozen=True)

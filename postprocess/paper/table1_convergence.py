@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibfil.study_members import Member
+from ibfil.studies.member import Member
 
 from . import lagged_tension
 from .drawing import COLOURS, axes_labels, new_figure

@@ -15,7 +15,7 @@ study swimmer_trade trade swimmer_stokes output.grid_every=1.885 time.step=0.003
 
 # Ways to the same velocity, and how nodes are placed: kernels, precision, method.
 study method_trade trade swimmer_stokes output.grid_every=1.885 'fluid.cells=[64,64,64]' filament.swimmer.nodes=21 output.every=0.031416 \
-    --vary fluid.method=table,averaged,pruned,krylov,fft --vary time.step=0.031416,0.015708,0.007854 --observe position,speed --clock processor
+    --vary fluid.method=table,pruned,krylov,fft --vary time.step=0.031416,0.015708,0.007854 --observe position,speed --clock processor
 
 # One swimmer under four fluids, on a grid that is right.
 study swimmer_compare compare swimmer_stokes fluid.density=1 time.end=2.51328 output.grid_every=2.51328 --fluids rft,matched,stokes,navier-stokes

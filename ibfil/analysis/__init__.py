@@ -1,0 +1,1 @@
+"""A finished run: its numbers, flow, meshes and energy."""

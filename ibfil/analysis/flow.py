@@ -1,0 +1,104 @@
+"""The fluid's velocity at any point of a recorded run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from ..assembly.fluids.models import fluid_model
+from ..assembly.grid import kernel
+from ..errors import CaseError
+
+if TYPE_CHECKING:
+    from ..assembly.fluids.base import FluidModel
+    from ..io.reader import GridRecord, RunFile
+
+
+class Flow(Protocol):
+    """What knows the flow of a run."""
+
+    def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:
+        """The velocity (k, 3) at ``points`` (k, 3); CaseError for times it does not know."""
+
+
+def flow_of(run: RunFile) -> Flow:
+    """The flow of a run: computed from the recorded forces where they alone make it, else its recorded field.
+
+    Raises CaseError for a run in resistive-force theory, and for one without the field that is needed.
+    """
+    fluid = fluid_model(run.case)
+    if fluid.grid is None:
+        what = "resistive-force theory knows no flow between the rods"
+        raise CaseError([f'{run.path}: fluid.model: found "rft"; {what}; allowed: a fluid on a grid'])
+    if fluid.flow_from_forces:
+        return FlowOfForces(run, fluid)
+    grid = run.grid
+    if grid is None or "velocity" not in grid.fields:
+        allowed = 'output.grid_every with "velocity" among output.fields'
+        raise CaseError(
+            [f"{run.path}: found no velocity field, which this fluid's flow is read from; allowed: {allowed}"]
+        )
+    return FlowOfField(run, grid)
+
+
+class FlowOfForces:
+    """u0 + J L^-1 S F: one solve on the run's own grid, whatever the number of points."""
+
+    def __init__(self, run: RunFile, fluid: FluidModel) -> None:
+        self._run, self._background, self._solve = run, fluid.flow, fluid.solve_for_flow()
+        self._kernel = kernel(run.case)
+
+    def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:
+        """One FFT there and back, and an interpolation with the run's kernel."""
+        from ..grid.spreading import interpolate
+
+        r, force = self._pushes(time)
+        field = self._solve.field(*self._stencil(r), force)
+        u = interpolate(*self._stencil(points), field)
+        return u if self._background is None else u + self._background(points, time)
+
+    def _stencil(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self._kernel.stencil(self._solve.grid.coordinates(r))
+
+    def _pushes(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and forces (n, 3) of all nodes, linear between the outputs about ``time``."""
+        i, part = between(self._run.time, time, str(self._run.path))
+        both = []
+        for key in ("position", "force"):
+            parts = [columns[key][i : i + 2] for columns in self._run.filaments.values()]
+            two = np.concatenate(parts, axis=1)
+            both.append(np.ascontiguousarray((1.0 - part) * two[0] + part * two[-1]))
+        return both[0], both[1]
+
+
+class FlowOfField:
+    """The recorded velocity, trilinear between its points and linear between its times."""
+
+    def __init__(self, run: RunFile, grid: GridRecord) -> None:
+        self._path, self._grid = str(run.path), grid
+        self._time, self._field = np.asarray(grid.time), grid.fields["velocity"]
+
+    def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:
+        """Eight points of each of two fields."""
+        i, part = between(self._time, time, self._path)
+        x = (points - self._grid.origin) / self._grid.spacing
+        low = np.floor(x).astype(int)
+        u = np.zeros_like(points)
+        for field, share in zip(self._field[i : i + 2], (1.0 - part, part), strict=False):
+            for corner in np.ndindex(2, 2, 2):
+                weight = share * np.prod(np.where(corner, x - low, 1.0 - (x - low)), axis=1)
+                index = tuple(((low + corner) % field.shape[:3]).T)
+                u += weight[:, None] * field[index]
+        return u
+
+
+def between(times: np.ndarray, time: float, path: str) -> tuple[int, float]:
+    """The number of the last of ``times`` (T,) not after ``time``, and how far it is on the way to the next."""
+    slack = 1e-9 * (times[-1] - times[0])
+    if not times[0] - slack <= time <= times[-1] + slack:
+        raise CaseError([f"{path}: time: found {time:g}; allowed: {times[0]:g} to {times[-1]:g}"])
+    if len(times) == 1:
+        return 0, 0.0
+    i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
+    return i, float(np.clip((time - times[i]) / (times[i + 1] - times[i]), 0.0, 1.0))

@@ -1,0 +1,198 @@
+"""Outputs of a run as vtk's own datasets: filaments as polylines, fields as images. vtk is imported only then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..assembly.fluids.models import fluid_model
+from .periodic_images import Pieces, unwrapped, wrapped
+
+if TYPE_CHECKING:
+    from vtkmodules.vtkCommonDataModel import vtkDataSet
+
+    from ..io.frames import FilamentFrame, Frame
+    from ..io.reader import RunFile
+
+
+class View(NamedTuple):
+    """How filaments are shown: brought into the periodic box, and their images in so many boxes on each side."""
+
+    wrap: bool = False
+    images: int = 0
+
+
+PLAIN = View()
+
+
+class Rod(NamedTuple):
+    """What a filament keeps through a run: arclength (N,), and the radius (N,) of the tube it is shown as."""
+
+    s: np.ndarray
+    radius: np.ndarray
+
+
+def rods_of(run: RunFile) -> dict[str, Rod]:
+    """All filaments of a run by name.
+
+    The tube is the material radius where the case gives one; else the hydrodynamic radius that the grid gives a line;
+    else, under rft, a hundredth of the length.
+    """
+    return {name: Rod(run.arclength(name), _radius(run, name)) for name in run.filaments}
+
+
+def _radius(run: RunFile, name: str) -> np.ndarray:
+    s, filament = run.arclength(name), run.filament(name)
+    if filament.radius is not None:
+        return np.broadcast_to(np.asarray(filament.radius.bind("s")(s), float), s.shape)
+    radius = fluid_model(run.case).line_radius
+    return np.full(s.shape, 0.01 * filament.length if radius is None else radius)
+
+
+def filament_data(run: RunFile, output: int, view: View = PLAIN) -> vtkDataSet:
+    """All filaments at output number ``output`` as vtkPolyData (`polylines`).
+
+    Raises ValueError where ``view`` asks for a periodic box and the case has none.
+    """
+    return polylines(run.frame(output), rods_of(run), box_of(run), view)
+
+
+def field_data(run: RunFile, number: int) -> vtkDataSet:
+    """The fields put out at ``grid.time[number]`` as vtkImageData, with the Q-criterion where there is a velocity."""
+    grid = run.grid
+    assert grid is not None
+    fields = {name: column[number] for name, column in grid.fields.items()}
+    if "velocity" in fields:
+        fields["q_criterion"] = q_criterion(fields["velocity"], grid.spacing)
+    return image(fields, grid.origin, grid.spacing, float(grid.time[number]))
+
+
+def box_of(run: RunFile) -> np.ndarray | None:
+    """The periodic box (3,), centred on the origin; None where the fluid has none."""
+    return fluid_model(run.case).box
+
+
+def directors(position: np.ndarray, e1: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """e2 and e3 (N, 3) of a filament: e3 is its tangent by central differences, made normal to e1 (N, 3)."""
+    tangent = np.gradient(position, s, axis=0, edge_order=2)
+    tangent = tangent - np.sum(tangent * e1, axis=1, keepdims=True) * e1
+    e3 = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.cross(e3, e1), e3
+
+
+def q_criterion(velocity: np.ndarray, spacing: np.ndarray) -> np.ndarray:
+    """Q = (|W|^2 - |S|^2)/2 (nx, ny, nz) of a velocity (nx, ny, nz, 3), the excess of rotation over strain.
+
+    -tr(G G)/2 + tr(G)^2/2 of the gradient G by central differences of second order, one-sided at the faces: a
+    background flow need not be periodic. Hunt, Wray and Moin, Center for Turbulence Research report S88, 1988.
+    """
+    gradient = np.stack(
+        [np.stack(np.gradient(velocity[..., c].astype(float), *spacing, edge_order=2)) for c in range(3)]
+    )
+    trace = np.einsum("aa...->...", gradient)
+    return 0.5 * (trace**2 - np.einsum("ab...,ba...->...", gradient, gradient))
+
+
+def polylines(frame: Frame, rods: dict[str, Rod], box: np.ndarray | None = None, view: View = PLAIN) -> vtkDataSet:
+    """All filaments at one time as vtkPolyData: a polyline a filament, arrays at the nodes in float32.
+
+    Wrapped ones are cut at the faces of the box, with points there; images carry which box they are in (``image``).
+    """
+    if box is None and view != PLAIN:
+        raise ValueError("periodic images and wrapping need a box, and this run has none")
+    box = np.zeros(3) if box is None else box
+    points: list[np.ndarray] = []
+    arrays: list[dict[str, np.ndarray]] = []
+    lengths: list[int] = []
+    shifts = sorted(product(range(-view.images, view.images + 1), repeat=3), key=lambda shift: shift != (0, 0, 0))
+    for number, (name, rod) in enumerate(rods.items()):
+        filament = frame.filaments[name]
+        pieces = wrapped(filament.position, -0.5 * box, box) if view.wrap else unwrapped(len(rod.s))
+        own = pieces.take(filament.position) - pieces.image * box
+        shown = _on(pieces, _node_arrays(filament, rod))
+        shown["filament"] = np.full(len(own), number, np.int32)
+        for shift in shifts:
+            points.append(own + np.array(shift) * box)
+            more = {"image": np.tile(np.array(shift, np.int32), (len(own), 1))} if view.images else {}
+            arrays.append(shown | more)
+            lengths += pieces.lengths
+    return _poly_data(np.concatenate(points), lengths, arrays, frame.time)
+
+
+def _on(pieces: Pieces, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {key: pieces.take(values).astype(np.float32) for key, values in arrays.items()}
+
+
+def _poly_data(
+    points: np.ndarray, lengths: Sequence[int], arrays: Sequence[dict[str, np.ndarray]], time: float
+) -> vtkDataSet:
+    """Polylines of so many points each, one after the other."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+
+    nodes = vtkPoints()
+    nodes.SetData(numpy_to_vtk(points, deep=True))
+    offsets = np.cumsum([0, *lengths], dtype=np.int64)
+    lines = vtkCellArray()
+    each = np.arange(offsets[-1], dtype=np.int64)
+    lines.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(each, deep=True))
+    data = vtkPolyData()
+    data.SetPoints(nodes)
+    data.SetLines(lines)
+    for key in arrays[0]:
+        _add(data.GetPointData(), key, np.concatenate([shown[key] for shown in arrays]))
+    _add(data.GetFieldData(), "TimeValue", np.array([time]))
+    return data
+
+
+def _node_arrays(filament: FilamentFrame, rod: Rod) -> dict[str, np.ndarray]:
+    """The arrays of one filament as they appear in ParaView, all with N rows.
+
+    Tension lives on segments: a node shows the mean of its two, an end its only one.
+    """
+    e2, e3 = directors(filament.position, filament.e1, rod.s)
+    tension = filament.tension
+    return {
+        "velocity": filament.velocity,
+        "force": filament.force,
+        "moment": filament.moment,
+        "strain": filament.strain,
+        "e1": filament.e1,
+        "e2": e2,
+        "e3": e3,
+        "tension": 0.5 * (np.append(tension[0], tension) + np.append(tension, tension[-1])),
+        "tube_radius": rod.radius,
+        "arclength": rod.s,
+    }
+
+
+def image(fields: dict[str, np.ndarray], origin: np.ndarray, spacing: np.ndarray, time: float) -> vtkDataSet:
+    """Fields (nx, ny, nz) or (nx, ny, nz, 3) at one time as vtkImageData, float32.
+
+    Point (i, j, k) lies at origin + spacing (i, j, k). VTK counts x fastest and the run file z, hence the
+    transpose.
+    """
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+
+    data = vtkImageData()
+    data.SetOrigin(*map(float, origin))
+    data.SetSpacing(*map(float, spacing))
+    for name, values in fields.items():
+        data.SetDimensions(*values.shape[:3])
+        ordered = values.transpose(2, 1, 0, *range(3, values.ndim))
+        _add(data.GetPointData(), name, ordered.reshape(-1, *values.shape[3:]).astype(np.float32))
+    _add(data.GetFieldData(), "TimeValue", np.array([time]))
+    return data
+
+
+def _add(attributes: Any, name: str, values: np.ndarray) -> None:
+    """Put an array (n,) or (n, 3) into point or field data, under a name that ParaView can take."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+    array.SetName(name.replace("/", "_").replace(".", "_"))
+    attributes.AddArray(array)

@@ -1,0 +1,201 @@
+"""What is in a run file, as text, JSON, a table, or one figure: `ibfil show`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..io.reader import RunFile
+from ..io.units import label
+from ..observables.base import Observable
+from ..observables.expectations import check
+from ..observables.factory import observers
+from ..observables.observers import Summary, summaries
+
+
+def digest(run: RunFile) -> dict[str, Any]:
+    """All that is told of a run, ready for JSON: a number that is not finite is None, a vector a list."""
+    case = run.case
+    observables = observers(case).observables
+    found = summaries(observables, run.time, {name: np.asarray(run.observables[name]) for name in observables})
+    return {
+        "file": str(run.path),
+        "title": case.title,
+        "source": case.source,
+        "status": run.status,
+        "reason": run.reason,
+        "created": run.created,
+        "finished": run.finished,
+        "outputs": len(run),
+        "time": [float(run.time[0]), float(run.time[-1])],
+        "units": case.units.model_dump(),
+        "steps": run.steps,
+        "wall_time": run.wall_time,
+        "fluid": case.fluid.model,
+        "method": run.method,
+        "groups": run.groups,
+        "filaments": {name: columns["position"].shape[1] for name, columns in run.filaments.items()},
+        "fields": {} if run.grid is None else {name: len(column) for name, column in run.grid.fields.items()},
+        "observables": {name: _observed(run, name, observables.get(name), found.get(name)) for name in run.observables},
+        "diagnostics": {name: _extent(run, name) for name in run.diagnostics},
+        "expected": [
+            {
+                "name": held.name,
+                "observe": held.observe,
+                "expected": held.expected,
+                "found": _plain(held.found),
+                "error": _plain(held.error),
+                "passed": held.passed,
+                "source": held.source,
+                "note": held.note,
+            }
+            for held in check(case, found)
+        ],
+        "versions": run.versions,
+        "case": run.case_text,
+    }
+
+
+def _observed(run: RunFile, name: str, observable: Observable | None, found: Summary | None) -> dict[str, Any]:
+    """The number of one observable; the last value of one that was added from Python."""
+    path = f"observables/{name}"
+    if observable is None or found is None:
+        last = _plain(run.observables[name][-1])
+        return {"value": last, "units": run.units(path), "description": run.description(path), "note": ""}
+    units = label(run.case.units, observable.summary_dimension)
+    return {
+        "value": _plain(found.value),
+        "units": units,
+        "description": getattr(observable, "words", run.description(path)),
+        "note": found.note,
+    }
+
+
+def _plain(value: float | np.ndarray) -> float | list[float | None] | None:
+    numbers = [float(v) if np.isfinite(v) else None for v in np.atleast_1d(value)]
+    return numbers if np.ndim(value) else numbers[0]
+
+
+def _extent(run: RunFile, name: str) -> dict[str, Any]:
+    """The range of a diagnostic over the run: of a vector, of its size."""
+    values = np.asarray(run.diagnostics[name])
+    size = np.linalg.norm(values, axis=-1) if values.ndim > 1 else values
+    return {"min": _plain(size.min()), "max": _plain(size.max()), "units": run.units(f"diagnostics/{name}")}
+
+
+def as_text(told: Mapping[str, Any]) -> str:
+    """The digest of a run for the eye."""
+    unit = "" if told["units"]["time"] == "1" else " " + told["units"]["time"]
+    end = f", until {told['finished']}" if told["finished"] else ""
+    nodes = listed([f"{name} ({count} nodes)" for name, count in told["filaments"].items()])
+    start, stop = told["time"]
+    about = [
+        ("run", f"{told['file']}: {told['status']}" + (f" ({told['reason']})" if told["reason"] else "")),
+        ("begun", told["created"] + end),
+        ("time", f"{start:g} to {stop:g}{unit}, {told['outputs']} outputs"),
+        ("steps", f"{told['steps']} in {duration(told['wall_time'])}"),
+        ("fluid", f"{told['fluid']}, method {told['method']}"),
+        ("groups", "  ".join(f"{name} = {value:.4g}" for name, value in told["groups"].items()) or "none"),
+        ("filaments", nodes),
+        ("fields", ", ".join(f"{name} at {count} times" for name, count in told["fields"].items()) or "none"),
+        ("versions", ", ".join(f"{name} {version}" for name, version in told["versions"].items())),
+    ]
+    ranges = [
+        (name, "", f"{_number(d['min'])} to {_number(d['max'])}", d["units"], "")
+        for name, d in told["diagnostics"].items()
+    ]
+    head = [line for line in (told["title"], told["source"]) if line]
+    return "\n".join(
+        [
+            *head,
+            "",
+            *table(about),
+            "",
+            results(told),
+            "",
+            "over the run (of a vector its size)",
+            *_unit_rows(ranges),
+        ]
+    )
+
+
+def results(told: Mapping[str, Any], changes: str = "") -> str:
+    """The observables and what was expected of them, of the case without ``changes``, as `ibfil run` ends with."""
+    rows = [
+        (name, "=", _number(found["value"]), found["units"], found["note"] or found["description"])
+        for name, found in told["observables"].items()
+    ]
+    lines = ["observables", *_unit_rows(rows)] if rows else ["no observables in this case"]
+    if told["expected"]:
+        lines += [
+            "",
+            f"expected of the case without {changes}" if changes else "expected",
+            *table(_held(one) for one in told["expected"]),
+        ]
+    return "\n".join(lines)
+
+
+def _held(one: Mapping[str, Any]) -> tuple[str, ...]:
+    """The columns of one expectation."""
+    verdict = "ok" if one["passed"] else "differs"
+    source = f"({one['source']})" if one["source"] else ""
+    return verdict, one["name"], _number(one["found"]), f"expected {one['expected']}", one["note"] or source
+
+
+def _unit_rows(rows: Iterable[tuple[str, str, str, str, str]]) -> list[str]:
+    """A table of name, sign, number, unit, words, in which the unit "1" is not written."""
+    return table((name, sign, number, "" if unit == "1" else unit, words) for name, sign, number, unit, words in rows)
+
+
+def table(rows: Iterable[Iterable[str]]) -> list[str]:
+    """Lines with columns set flush, two blanks apart; a column that is empty throughout is left out."""
+    cells = [list(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    kept = [i for i, width in enumerate(widths) if width]
+    return ["  " + "  ".join(row[i].ljust(widths[i]) for i in kept).rstrip() for row in cells]
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """All names, or of many the first ones, the last and how many they are."""
+    if len(names) <= most:
+        return ", ".join(names)
+    return f"{', '.join(names[: most - 2])}, ..., {names[-1]}; {len(names)} in all"
+
+
+def _number(value: float | list[float | None] | None) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_number, value)) + "]"
+    return "none" if value is None else f"{value:.6g}"
+
+
+def duration(seconds: float) -> str:
+    """A wall time for the eye: 0.42 s, 12 s, 3 min 20 s, 2 h 5 min."""
+    if seconds < 60:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def as_json(told: Mapping[str, Any]) -> str:
+    """The digest as JSON."""
+    return json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def write_csv(run: RunFile, path: str | Path) -> None:
+    """Time and all observables as a table under one row of names, all digits; a vector in three columns."""
+    columns: dict[str, np.ndarray] = {"time": run.time}
+    for name, column in run.observables.items():
+        values = np.asarray(column)
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            columns |= {f"{name}_{axis}": values[:, i] for i, axis in enumerate("xyz")}
+    with Path(path).open("w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out)
+        writer.writerow(columns)
+        writer.writerows(zip(*(map(repr, c.tolist()) for c in columns.values()), strict=True))

@@ -1,0 +1,48 @@
+"""From the [contact] of a case to the search for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import CaseError
+from ..rods.contact import Contact, ContactRepels, ContactStops, ContactWarns
+from ..rods.neighbour_search import Segments
+from .profiles import alone
+
+if TYPE_CHECKING:
+    from ..case.filament import Filament
+    from ..case.schema import Case
+
+
+def contact(
+    case: Case, names: Sequence[str], filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray
+) -> Contact:
+    """Contact of all filaments of a case. Raises CaseError where a periodic box is too small for its distance."""
+    given = case.contact
+    assert given is not None
+    parts: list[tuple[np.ndarray, ...]] = []
+    for number, (filament, where) in enumerate(zip(filaments, nodes, strict=True)):
+        here, first = s[where], np.arange(where.start, where.stop - 1)
+        if given.distance is not None:
+            radius = np.full(len(first), 0.5 * given.distance)
+        else:
+            assert filament.radius is not None
+            thick = alone(filament.radius, here)
+            radius = 0.5 * (thick[1:] + thick[:-1])
+        parts.append((first, here[:-1], here[1:], np.full(len(first), number), radius))
+    segments = Segments(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    box = np.zeros(3)
+    if case.fluid.on_grid:
+        box[:] = case.fluid.box
+        widest, longest = 2 * float(np.max(segments.radius)), float(np.max(segments.end - segments.begin))
+        reach = (2 if given.action == "repel" else 1) * widest + longest
+        if reach > 0.5 * np.min(box):
+            allowed = "so much that with a segment's length it reaches less than half of fluid.box"
+            raise CaseError([f"{case.file}: contact.distance: found {widest:g}; allowed: {allowed}"])
+    offsets = [where.start for where in nodes]
+    if given.action == "repel":
+        return ContactRepels(segments, names, offsets, box, given.strength)
+    return (ContactStops if given.action == "stop" else ContactWarns)(segments, names, offsets, box)

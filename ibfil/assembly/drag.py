@@ -1,0 +1,77 @@
+"""From a case to the drag of its nodes in resistive-force theory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..case.fluid import Coefficients, Matched
+from ..errors import CaseError
+from ..fluids import resistive_force
+from . import grid
+from .profiles import alone
+
+if TYPE_CHECKING:
+    from ..case.filament import Filament
+    from ..case.schema import Case
+    from ..fluids.calibrated_drag import Match
+    from .stacked import Stacked
+
+
+def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None) -> tuple[float, float, np.ndarray]:
+    """Drag per length across and along the rod, and against spin (k,): paper, slender (Sec. 7.5), given, matched."""
+    eta, drag = case.fluid.viscosity, case.fluid.drag
+    spin = np.zeros(1) if radius is None else 4 * np.pi * eta * radius**2
+    if isinstance(drag, Coefficients):
+        return drag.perp, drag.par, spin if drag.spin is None else np.full(1, drag.spin)
+    found = matching(case, filament)
+    if found is not None:
+        if radius is not None and found.spin:
+            spin = eta * found.spin * (radius / np.mean(radius)) ** 2
+        return eta * found.perp, eta * found.par, spin
+    if drag == "slender":
+        if radius is None:
+            raise ValueError("slender drag needs a radius")
+        perp = 8 * np.pi * eta / np.log(filament.length**2 / (4 * float(np.mean(radius)) ** 2 * np.e))
+        return perp, 0.5 * perp, spin
+    return 4 * np.pi * eta, 2 * np.pi * eta, spin
+
+
+def matching(case: Case, filament: Filament) -> Match | None:
+    """The drag of a straight rod in the case's grid; None where RFT does not take its drag from there.
+
+    Raises CaseError where the grid cannot tell it.
+    """
+    drag = case.fluid.drag
+    if case.fluid.model != "rft" or not isinstance(drag, Matched):
+        return None
+    from ..fluids import calibrated_drag
+
+    box, cells = case.fluid.box, case.fluid.cells or grid.cells_of_thickness(case)
+    assert box is not None
+    nodes, radius = 1 + round(drag.matched * (filament.nodes - 1) / filament.length), 0.0
+    if case.fluid.rotation == "grid" and filament.twisting is not None and filament.radius is not None:
+        radius = float(np.mean(alone(filament.radius, np.linspace(0.0, filament.length, filament.nodes))))
+    rod = calibrated_drag.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip, radius)
+    try:
+        return calibrated_drag.match(rod)
+    except ValueError as error:
+        allowed = "slip = 0.01, fewer nodes or more cells"
+        raise CaseError([f"{case.file}: fluid.drag: {error}; allowed: {allowed}"]) from None
+
+
+def drag(case: Case, stacked: Stacked) -> resistive_force.Drag:
+    """The drag of every node: coefficients times control volumes."""
+    volume = stacked.mechanics.mesh.volume
+    out = resistive_force.Drag(*(np.zeros(len(volume)) for _ in range(3)))
+    for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
+        s = stacked.s[where]
+        radius = None
+        if filament.radius is not None:
+            radius = alone(filament.radius, s)
+        for field, value in zip(out, drag_coefficients(case, filament, radius), strict=True):
+            field[where] = value * volume[where]
+    # A filament that does not twist has its turn held; any positive drag will do for the row.
+    out.spin[out.spin == 0] = 1.0
+    return out

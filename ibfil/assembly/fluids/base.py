@@ -1,0 +1,170 @@
+"""A model of the fluid, as a case names it: what makes the fluid, and all that is told of it.
+
+One class a model, listed in models.py. What checks, budgets, warnings and pictures want to know of a fluid they ask its
+model; none of them compares a word of the case.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from .. import costs
+
+if TYPE_CHECKING:
+    from ...case.filament import Filament
+    from ...case.schema import Case
+    from ...fluids.base import Flow, Fluid
+    from ...fluids.output import FluidOutput
+    from ...fluids.stokes import StokesSolve
+    from ...grid.periodic_grid import Grid
+    from ...io.frames import Frame
+    from ...rods.geometry import Geometry
+    from ..stacked import Stacked
+
+
+class Term(NamedTuple):
+    """A term of the model: seconds a step and bytes, from counts."""
+
+    name: str
+    seconds: float
+    bytes: float
+
+
+class Scene(Protocol):
+    """What the warnings of a fluid ask of a simulation: where its rods begin, and what they do then."""
+
+    @property
+    def rods(self) -> Stacked:
+        """The rods of the scene."""
+
+    @property
+    def shape(self) -> Geometry:
+        """Their present configuration."""
+
+    def nodes(self, name: str) -> slice:
+        """The range of nodes of a filament, or of its first copy."""
+
+    def frame(self) -> Frame:
+        """What an output would hold."""
+
+
+class FluidModel(ABC):
+    """A model of the fluid in a case. Nothing is made before it is asked for."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+
+    # -- the fluid itself
+
+    @abstractmethod
+    def build(self, rods: Stacked) -> Fluid:
+        """The fluid that answers to these rods. Raises CaseError where it cannot be made."""
+
+    @abstractmethod
+    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
+        """What is put out of it besides the motion of the rods."""
+
+    @cached_property
+    def grid(self) -> Grid | None:
+        """Its grid; None where it has none."""
+        return None
+
+    @cached_property
+    def flow(self) -> Flow | None:
+        """The background velocity (k, 3) at places r (k, 3) and a time; None where the case has none."""
+        from ..flow import flow
+
+        return flow(self.case)
+
+    def method(self, rods: Stacked) -> str:
+        """How velocities are found."""
+        return self.case.fluid.model
+
+    def transforms(self, rods: Stacked) -> bool:
+        """Whether steps transform fields, by plans that are worth keeping."""
+        return False
+
+    # -- what a step costs
+
+    def seconds(self, rods: Stacked) -> dict[str, float]:
+        """Estimated seconds of a step by each method that the fluid has, from counts."""
+        return {self.case.fluid.model: costs.of_rods(self.case, len(rods.s))}
+
+    @abstractmethod
+    def terms(self, rods: Stacked, memory: Mapping[str, float], step: float) -> list[Term]:
+        """The fluid's terms in a step of length ``step``, given the bytes of large arrays by name."""
+
+    def memory(self, rods: Stacked) -> dict[str, float]:
+        """Bytes of its large arrays, by what they are for."""
+        return {}
+
+    # -- the speeds of the scene
+
+    @abstractmethod
+    def drag(self, filament: Filament) -> float:
+        """A drag per length across, for time scales."""
+
+    def automatic_limit(self, longest: float) -> float:
+        """What an automatic step may be at most, given the ``longest`` that the fluid's own motion allows."""
+        return longest
+
+    # -- what is told
+
+    @abstractmethod
+    def modelled(self) -> list[str]:
+        """What it models, a line each."""
+
+    @abstractmethod
+    def absent(self) -> list[str]:
+        """What it leaves out, a line each."""
+
+    inertia_absent = "inertia of rod and fluid"
+
+    def size(self) -> list[str]:
+        """Lines about its grid and what that makes of a rod."""
+        return []
+
+    def remarks(self) -> list[str]:
+        """Lines about what a step takes."""
+        return []
+
+    steps_known = True  # whether the number of steps is known beforehand
+
+    def step_lines(self) -> list[str]:
+        """Lines about limits of the step."""
+        return []
+
+    def groups(self, filament: Filament, rate: float) -> dict[str, float]:
+        """Dimensionless groups of a filament that the fluid brings; ``rate``: of what drives it, radians a time."""
+        return {}
+
+    def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
+        """What should make one look twice at a filament in this fluid, given its groups."""
+        return []
+
+    def warnings(self, scene: Scene) -> list[str]:
+        """What should make one look twice at the whole scene."""
+        return []
+
+    # -- pictures and recorded runs
+
+    @property
+    def box(self) -> np.ndarray | None:
+        """The sides (3,) of a periodic box, centred on the origin; None where the fluid is not periodic."""
+        return None
+
+    @property
+    def line_radius(self) -> float | None:
+        """The hydrodynamic radius that the fluid gives a line of nodes; None where nodes have none of their own."""
+        return None
+
+    flow_from_forces = False  # whether recorded forces alone tell the flow at any point
+
+    def solve_for_flow(self) -> StokesSolve:
+        """What finds the velocity that recorded forces drive. Only where ``flow_from_forces``."""
+        raise NotImplementedError(self.case.fluid.model)

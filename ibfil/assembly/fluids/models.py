@@ -1,0 +1,24 @@
+"""The models of the fluid that a case may name: one class each, one line each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .base import FluidModel
+from .navier_stokes import NavierStokesModel
+from .resistive_force import ResistiveForceModel
+from .stokes import StokesModel
+
+if TYPE_CHECKING:
+    from ...case.schema import Case
+
+MODELS: dict[str, type[FluidModel]] = {
+    "rft": ResistiveForceModel,
+    "stokes": StokesModel,
+    "navier-stokes": NavierStokesModel,
+}
+
+
+def fluid_model(case: Case) -> FluidModel:
+    """The model of the fluid that the case names."""
+    return MODELS[case.fluid.model](case)

@@ -1,0 +1,161 @@
+"""From a case to Navier-Stokes flow on a periodic grid, and what is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...case.shape import RunShape
+from .. import costs
+from ..flow import flow_parts
+from .base import Term
+from .on_grid import GridModel
+
+if TYPE_CHECKING:
+    from ...case.filament import Filament
+    from ...fluids.base import Fluid
+    from ...fluids.immersed_boundary import Immersed
+    from ...fluids.output import FluidOutput
+    from ...fluids.stokes import Solver, Tabulated
+    from ..stacked import Stacked
+    from .base import Scene
+
+CELLS, INERTIAL = 0.125, 0.5  # see crossing
+_HISTORY = "past of the fluid, as large in a checkpoint"
+_TRANSFORMS = "its transforms"
+
+
+def crossing(reynolds: float) -> float:
+    """Cells that the fastest fluid may cross in an automatic step, by a cell's own Reynolds number rho u h/eta.
+
+    As a rod passes a point of the grid, fluid without inertia follows at once; with it the velocity there is stepped
+    through the passing, so this goes from 1 to CELLS around INERTIAL. Set to errors of about 1e-3 L in two periods of
+    the swimmer with its fastest node at Re 7 to 880; 25 steps a period, 0.4 cells, make 3e-3 L of them at Re 88, a
+    speed wrong by 9 %, and none at Re 880: the run fails.
+    """
+    return (INERTIAL + CELLS * reynolds) / (INERTIAL + reynolds)
+
+
+class NavierStokesModel(GridModel):
+    """Navier-Stokes flow on a periodic grid, from rest: the statement of Stokes flow with a history."""
+
+    inertia_absent = "inertia of the rod beyond the fluid it displaces"
+    steps_known = False
+
+    @property
+    def density(self) -> float:
+        """That of the fluid."""
+        assert self.case.fluid.density is not None
+        return self.case.fluid.density
+
+    def fluid(self, rods: Stacked, immersed: Immersed, method: str) -> Fluid:
+        """The fluid, its forces answered by ``method``; what transforms whole fields shares one room for it."""
+        from ...fluids import stokes
+        from ...fluids.background_flow import Background
+        from ...fluids.navier_stokes import NavierStokes, Room
+        from ...fluids.torque_coupling import TorqueStokesSolve
+
+        threads = self.case.compute.threads
+        room = Room(immersed.grid, immersed.coupling.vectors, threads, immersed.number)
+        shared = room.flow if immersed.number is np.float64 else None  # solvers by FFT are exact to round-off
+        factor_cost = self.factor_cost(rods)
+
+        def operator(alpha: float) -> Tabulated:
+            if method == "table":
+                return stokes.StokesByTable(immersed, alpha)
+            solver: Solver
+            if immersed.coupling.vectors == 1:
+                solver = stokes.StokesSolve(immersed.grid, immersed.viscosity, threads, alpha=alpha, transform=shared)
+            else:
+                solver = TorqueStokesSolve(immersed.grid, immersed.viscosity, threads, alpha, shared)
+            if method == "krylov":
+                return stokes.StokesByKrylov(immersed, solver, factor_cost, alpha)
+            return stokes.StokesByFFT(immersed, solver, alpha)
+
+        background = None
+        if immersed.flow is not None:
+            background = Background(immersed.grid, immersed.flow, flow_parts(self.case), threads)
+        return NavierStokes(immersed, self.density, operator, room, background)
+
+    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
+        """Of the velocity that the fluid has."""
+        from ...fluids.inertial_fields import InertialFields
+        from ...fluids.navier_stokes import NavierStokes
+        from ...fluids.output import GridOutput
+
+        assert isinstance(fluid, NavierStokes)
+        return GridOutput(self.immersed(rods), InertialFields(fluid, self.flow, self.case.compute.threads))
+
+    def transforms(self, rods: Stacked) -> bool:
+        """Always: advection does."""
+        return True
+
+    # -- what a step costs
+
+    def _flow_terms(self, rods: Stacked, seconds: float, used: Mapping[str, float]) -> list[Term]:
+        """What answers to the forces; history and advection apart."""
+        past = min(seconds, costs.of_inertia(self.grid.cells.tolist(), self.parts))
+        held = used[_HISTORY] + used[_TRANSFORMS]
+        rest = super()._flow_terms(rods, seconds - past, {"rest": sum(used.values()) - held})
+        return [*rest, Term("inertia and advection", past, held)]
+
+    def memory(self, rods: Stacked) -> dict[str, float]:
+        """History and transforms, and the background flow; two mobility tables: of Euler's first step, and BDF2's."""
+        out, cells = super().memory(rods), self.grid.cells
+        modes = 3 * 2 * self._number * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)
+        out |= {_HISTORY: 4 * modes, _TRANSFORMS: modes + 4 * modes}
+        out["mobility table"] *= 2
+        if self.flow is not None:
+            parts = flow_parts(self.case) or []
+            fields = len(parts) + (len(parts) != 1 or parts[0].factor is not None)
+            out["the background flow"] = fields * 6 * 8.0 * float(np.prod(cells))
+        return out
+
+    # -- the speeds of the scene
+
+    def automatic_limit(self, longest: float) -> float:
+        """Shorter where a cell's own Reynolds number is large."""
+        reynolds = self.density * self.grid.spacing**2 / (self.case.fluid.viscosity * longest)
+        return longest * crossing(reynolds)
+
+    # -- what is told
+
+    def modelled(self) -> list[str]:
+        """Navier-Stokes flow, slip, spin."""
+        return ["Navier-Stokes flow on a periodic grid, from rest: with inertia and advection", *super().modelled()]
+
+    def remarks(self) -> list[str]:
+        """A background flow that is put on the grid at each step."""
+        if self.flow is None or flow_parts(self.case):
+            return []
+        return [
+            "fluid.flow is no sum of at most 4 products f(t) g(x, y, z) that is seen: it is put on the grid each step, "
+            "which takes as long as the step itself or twice that"
+        ]
+
+    def step_lines(self) -> list[str]:
+        """How far the fluid may move in a step."""
+        time = self.case.time
+        limited = "steps are shortened for it" if time.tolerance is not None else "told"
+        if time.automatic and time.tolerance is None:
+            limited = f"steps are shortened to that, to {CELLS:g} of it where rho u h/eta is large"
+        return [f"advection is extrapolated: stable while the fluid crosses less than about a cell a step ({limited})"]
+
+    def groups(self, filament: Filament, rate: float) -> dict[str, float]:
+        """The Reynolds number of what drives the scene, and those of the grid."""
+        out = {}
+        if rate:
+            out["Re = rho omega L^2/eta"] = self.density * rate * filament.length**2 / self.case.fluid.viscosity
+        return out | super().groups(filament, rate)
+
+    def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
+        """A shape from another run, whose flow is not known."""
+        out = super().warnings_of(scene, name, groups)
+        if isinstance(self.case.filaments[name].shape, RunShape):
+            out.append(
+                f"filament.{name}.shape: the shape of another run, and nothing of its flow: the fluid starts at rest, "
+                "or in fluid.flow"
+            )
+        return out

@@ -1,0 +1,84 @@
+"""From a case to resistive-force theory, and what is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import costs
+from ..drag import drag, drag_coefficients, matching
+from .base import FluidModel, Term
+
+if TYPE_CHECKING:
+    from ...case.filament import Filament
+    from ...fluids.base import Fluid
+    from ...fluids.output import FluidOutput
+    from ..stacked import Stacked
+    from .base import Scene
+
+_DRAG = 0.05  # seconds of drag, of those of the rods
+DRAG_SCATTER = 0.02  # scatter of a straight rod's drag over places and directions, above which it is no number
+
+
+class ResistiveForceModel(FluidModel):
+    """Drag of each node, and no flow between nodes (Eq. 16, 17, 48)."""
+
+    def build(self, rods: Stacked) -> Fluid:
+        """Drag per node, in the background flow."""
+        from ...fluids.resistive_force import ResistiveForce
+
+        return ResistiveForce(drag(self.case, rods), rods.mechanics.profile, self.flow)
+
+    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
+        """The heat of drag."""
+        from ...fluids.output import DragOutput
+
+        return DragOutput(self.flow)
+
+    def terms(self, rods: Stacked, memory: Mapping[str, float], step: float) -> list[Term]:
+        """Drag alone."""
+        n = len(rods.s)
+        return [Term("drag of each node", _DRAG * costs.of_rods(self.case, n), 8.0 * 3 * n)]
+
+    def drag(self, filament: Filament) -> float:
+        """The case's own, across."""
+        radius = None if filament.radius is None else np.atleast_1d(filament.radius.bind("s", "t")(0.0, 0.0))
+        return drag_coefficients(self.case, filament, radius)[0]
+
+    def modelled(self) -> list[str]:
+        """Drag, and where its coefficients come from."""
+        out = ["resistive-force drag on each node; no flow between nodes"]
+        calibrated = self.case.fluid.calibrated
+        if calibrated is not None:
+            out.append(f"its coefficients those of a straight rod of length {calibrated.matched:g} in the case's grid")
+        return out
+
+    def absent(self) -> list[str]:
+        """What a grid would add."""
+        return ["hydrodynamic interaction; grid and FFT plans"]
+
+    def groups(self, filament: Filament, rate: float) -> dict[str, float]:
+        """The radius that the case gives; with drag calibrated on a grid what was found there."""
+        out = {}
+        if filament.radius is not None:
+            middle = filament.radius.bind("s", "t")(0.5 * filament.length, 0.0)
+            out["a/L"] = float(np.max(middle)) / filament.length
+        matched = matching(self.case, filament)
+        if matched is not None:
+            out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
+            out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
+            if matched.spin:
+                out["matched zeta_r/eta"] = matched.spin
+        return out
+
+    def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
+        """Drag calibrated on a grid that cannot tell it to two digits."""
+        scatter = groups.get("matched scatter", 0.0)
+        if scatter <= DRAG_SCATTER:
+            return []
+        return [
+            f"filament.{name}: the drag of a straight rod differs by {scatter:.2g} of itself between places in a cell "
+            "and directions: set fluid.slip = 0.01, or take a wider fluid.kernel or a larger fluid.box"
+        ]

@@ -1,0 +1,88 @@
+"""From the moduli and the law of each filament to one law for the whole stack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..case.filament import Stiffening, TwoWell
+from ..case.table import ZERO
+from ..rods import constitutive
+from .profiles import alone, along, field, half
+
+if TYPE_CHECKING:
+    from ..case.expressions import Expression
+    from ..case.filament import Filament
+    from ..rods.base import Law
+    from ..rods.mesh import Mesh
+
+
+def law(
+    filaments: Sequence[Filament],
+    nodes: Sequence[slice],
+    s: np.ndarray,
+    mesh: Mesh,
+    given: Sequence[constitutive.MomentLaw | None],
+) -> Law:
+    """The law of all nodes (n,). ``given`` are laws made in Python, one a filament or None; they go first."""
+    out: Law = _linear(filaments, nodes, s)
+    others: list[tuple[slice, Law]] = []
+    for filament, where, own in zip(filaments, nodes, given, strict=True):
+        if own is not None:
+            others.append((where, constitutive.Given(own, s[where], filament.twisting is not None)))
+        elif filament.law.kind != "linear":
+            others.append((where, _nonlinear(filament, s[where])))
+    if others:
+        out = constitutive.Mixed(out, others)
+    if any(f.loads is not None and f.loads.internal_moment is not None for f in filaments):
+        along_e1 = field(filaments, nodes, s, lambda f: _internal(f, 0))
+        out = constitutive.Driven(out, (along_e1, field(filaments, nodes, s, lambda f: _internal(f, 1))))
+    gradient = np.zeros(len(s))
+    for filament, where, own in zip(filaments, nodes, given, strict=True):
+        if own is None and isinstance(filament.law, TwoWell):
+            gradient[where] = filament.law.gradient
+    if gradient.any():
+        out = constitutive.DomainWalls(out, mesh, gradient, field(filaments, nodes, s, lambda f: f.twist_rate))
+    return out
+
+
+def _bending(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray) -> np.ndarray:
+    """A1, A2 (n, 2)."""
+    first = along(filaments, nodes, s, lambda f: f.bending[0])
+    return np.stack([first, along(filaments, nodes, s, lambda f: f.bending[1])], axis=1)
+
+
+def _torsion(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray) -> np.ndarray:
+    """C (n,) at half nodes, zero where nothing twists."""
+    torsion = np.zeros(len(s))
+    for filament, where in zip(filaments, nodes, strict=True):
+        if filament.twisting is not None:
+            torsion[where.start : where.stop - 1] = half(alone(filament.twisting, s[where]))[:-1]
+    return torsion
+
+
+def _linear(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray) -> constitutive.Linear:
+    first = field(filaments, nodes, s, lambda f: f.curvature[0])
+    curvature = first, field(filaments, nodes, s, lambda f: f.curvature[1])
+    rate = field(filaments, nodes, s, lambda f: f.twist_rate)
+    return constitutive.Linear(_bending(filaments, nodes, s), _torsion(filaments, nodes, s), curvature, rate)
+
+
+def _nonlinear(filament: Filament, s: np.ndarray) -> Law:
+    """The law of one filament of nodes s (k,)."""
+    it = [filament], [slice(0, len(s))], s
+    linear, chosen = _linear(*it), filament.law
+    if isinstance(chosen, Stiffening):
+        return constitutive.Stiffening(linear, _bending(*it), _torsion(*it), chosen.coefficient, chosen.exponent)
+    assert isinstance(chosen, TwoWell)
+    rate = field(*it, lambda f: f.twist_rate)
+    return constitutive.TwoWell(linear, rate, chosen.wells, chosen.barrier)
+
+
+def _internal(filament: Filament, part: int) -> Expression:
+    """The internal moment along e1 (0) or e2 (1); zero where the filament has none."""
+    if filament.loads is None or filament.loads.internal_moment is None:
+        return ZERO
+    return filament.loads.internal_moment[part]

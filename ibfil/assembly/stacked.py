@@ -1,0 +1,34 @@
+"""All filaments of a scene, stacked node after node, with their mechanics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..rods.base import NoContact
+from ..rods.geometry import Geometry
+from ..rods.system import Mechanics
+
+if TYPE_CHECKING:
+    from ..case.filament import Filament
+    from ..rods.contact import Contact
+
+
+@dataclass(frozen=True)
+class Stacked:
+    """The rods of a scene: names and node ranges of its filaments, arclength (n,), and the whole of their mechanics."""
+
+    names: tuple[str, ...]
+    filaments: tuple[Filament, ...]
+    nodes: tuple[slice, ...]
+    s: np.ndarray
+    mechanics: Mechanics
+    start: Geometry
+    contact: Contact | NoContact
+
+    def locate(self, node: int) -> tuple[str, int]:
+        """The filament that a node of the stack is of, and its number there."""
+        k = next(k for k, where in enumerate(self.nodes) if node < where.stop)
+        return self.names[k], node - self.nodes[k].start

@@ -1,0 +1,1 @@
+"""`ibfil bench`: the pieces of a step against floors measured in the same run."""

@@ -1,0 +1,70 @@
+"""The parts of `ibfil bench`, and the table or JSON they end in."""
+
+from __future__ import annotations
+
+import json as json_format
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+
+from ..errors import CaseError
+from . import many as bench_many
+from . import pieces
+from . import threads as bench_threads
+from .timing import Row, table
+
+
+def many(cells: tuple[int, ...] = (64, 128), steps: int = 4) -> list[Row]:
+    """Time a node at 10,000 nodes against that at 1,000, and memory against 2 GiB and against what `check` tells."""
+    rows, limit = [], 2.0 * 2**30
+    for n in cells:
+        for nodes, few, lots in bench_many.PAIRS:
+            small, large = (bench_many.measured(count, nodes, n, steps) for count in (few, lots))
+            a, b = (f"{count} x {nodes}, {n}^3" for count in (lots, few))
+            how = ", ".join(f"{x['products']:.0f}" for x in (large, small))
+            piece, ratio = (
+                f"{a}: a node and step ({large['method']}, products {how})",
+                large["seconds"] / small["seconds"],
+            )
+            rows.append(Row(piece, large["seconds"], b, small["seconds"], ratio, 3.0))
+            peak, told = large["peak"], large["told"]
+            rows.append(Row(f"{a}: peak memory", peak, "2 GiB", limit, peak / limit, 1.0, "B"))
+            rows.append(Row(f"{a}: peak memory", peak, "told by check", told, peak / told, None, "B"))
+    return rows
+
+
+def threads() -> list[Row]:
+    """Two threads against one on a busy machine."""
+    return [Row(**row) for row in bench_threads.measured()]
+
+
+PARTS: dict[str, Callable[[], list[Row]]] = {
+    "pieces": lambda: [
+        pieces.rft_step(),
+        *pieces.evaluations(64, (1.15, 1 / 3.5)),
+        *pieces.evaluations(128, (1.3, 1 / 5)),
+        pieces.inertia(),
+        pieces.inertia(precision="single", bar=None),
+        pieces.table_pair("peskin4", 1.0),
+        pieces.table_pair("bkp6", 4.5),
+        pieces.start_up(),
+    ],
+    "swimmer": lambda: pieces.swimmers(),
+    "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],
+    "threads": threads,
+    "many": lambda: many(),
+}
+USUAL = ("pieces", "swimmer")
+
+
+def main(json: bool = False, parts: Sequence[str] = ()) -> int:
+    """Measures the parts asked for and prints a table, or JSON. Returns 0: a busy machine is no failure.
+
+    The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB.
+    Raises CaseError for a part there is not.
+    """
+    for part in set(parts) - set(PARTS):
+        raise CaseError([f"bench: found {part}; allowed: {', '.join(PARTS)}"])
+    parts = parts or USUAL
+    rows = [row for part in parts for row in PARTS[part]()]
+    print(json_format.dumps([asdict(row) for row in rows], indent=1) if json else table(rows))
+    return 0

@@ -1,0 +1,179 @@
+"""A filament without ``twisting``: its e1 is carried along and never turned, so nothing may ask for a twist.
+
+A round, naturally straight rod does not know where its e1 points, and may do anything. A rod with preferred
+curvature or A1 != A2 does: it twists when it leaves the plane normal to e1 or to e2, and is then refused.
+Shapes given by points or formulas are not looked at here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from .expressions import Expression, ExpressionError
+from .faults import Fault
+from .filament import End, Filament, Loads
+from .fluid import Fluid
+from .schema import Scene
+from .shape import Circle, Helix
+
+Vector = tuple[float, float, float]
+Components = Sequence[Expression] | Sequence[float]
+
+
+def check_planar(key: str, filament: Filament, case: Scene) -> Iterator[Fault]:
+    """The faults of a filament without ``twisting`` that needs it."""
+    reads = tuple(f"{key}.{name}" for name in ("twisting", "curvature", "bending", "direction", "normal", "position"))
+    for name in _twists(filament):
+        yield Fault(f"{key}.{name}", "a twist and no twisting", "only with twisting, the twist modulus C", reads[:1])
+    bent = [not _zero(kappa) for kappa in filament.curvature]
+    ribbon = filament.bending[0] != filament.bending[1]
+    if all(bent):
+        allowed = "3-D curvature only with twisting; if it is planar, turn normal so that one component is 0"
+        yield Fault(f"{key}.curvature", "two components and no twisting", allowed, reads)
+    elif ribbon or any(bent):
+        # kappa1 bends the rod in the plane normal to e1, kappa2 in that normal to e2; 0 leaves both.
+        leaving = [_leaving(key, filament, case, axis) for axis in (0, 1) if not bent[1 - axis]]
+        if all(leaving):
+            what = "A1 != A2" if ribbon else "preferred curvature"
+            found = f"what leads out of the plane of a rod with {what} and no twisting"
+            allowed = "a planar scene, or twisting, the twist modulus C"
+            yield from (Fault(name, found, allowed, reads) for name in leaving[0])
+
+
+def _zero(expression: Expression) -> bool:
+    return expression.constant == 0.0
+
+
+def _twists(filament: Filament) -> Iterator[str]:
+    """The keys that mean a twist."""
+    if not _zero(filament.twist_rate):
+        yield "twist_rate"
+    if not _zero(filament.shape.twist):
+        yield "shape.twist"
+    for side, end in (("start", filament.start), ("finish", filament.finish)):
+        for name in ("spin", "angle"):
+            if getattr(end, name) is not None:
+                yield f"{side}.{name}"
+        if end.end == "clamped" and end.twist == "free":
+            yield f"{side}.twist"
+    loads = filament.loads
+    if loads is not None and loads.moment is not None and not _zero(loads.moment[2]):
+        yield "loads.moment.2"
+
+
+def _leaving(key: str, filament: Filament, case: Scene, axis: int) -> list[str]:
+    """The keys that lead out of the plane normal to e1 (axis 0) or e2 (axis 1) at s = 0."""
+    directors = _directors(filament)
+    if directors is None:
+        return []  # told elsewhere: normal or direction
+    normal = directors[axis]
+    names = [f"{key}.{name}" for name in _own_leaving(filament, normal, axis)]
+    if case.fluid.flow is not None and _flow_leaves(case.fluid, filament, directors, axis):
+        names.append("fluid.flow")
+    if case.thermal is not None and (case.thermal.directions == "xyz" or math.hypot(*normal[:2]) > 1e-9):
+        names.append("thermal.directions")
+    return names
+
+
+def _own_leaving(filament: Filament, normal: Vector, axis: int) -> Iterator[str]:
+    """Those of the filament's own keys, as paths in its table."""
+    shape = filament.shape
+    if isinstance(shape, Helix) or (isinstance(shape, Circle) and shape.curvature != 0.0 and axis == 1):
+        yield "shape.kind"
+    if _along(shape.perturb, normal, filament):
+        yield "shape.perturb"
+    for side, end in (("start", filament.start), ("finish", filament.finish)):
+        yield from (f"{side}.{name}" for name in _end_leaving(end, filament, normal, axis))
+    if filament.loads is not None:
+        yield from (f"loads.{name}" for name in _loads_leaving(filament.loads, filament, normal, axis))
+
+
+def _end_leaving(end: End, filament: Filament, normal: Vector, axis: int) -> Iterator[str]:
+    for name in ("force", "moves", "tangent"):
+        value = getattr(end, name)
+        if value is not None and _along(value, normal, filament):
+            yield name
+    if end.spring is not None and _along(_minus(end.spring.to, filament.position), normal, filament):
+        yield "spring.to"
+    if end.moment is not None:  # in the plane bends a moment along its normal
+        if end.frame == "body":
+            across = not (_zero(end.moment[1 - axis]) and _zero(end.moment[2]))
+        else:
+            across = any(_along(end.moment, other, filament) for other in _across(normal))
+        if across:
+            yield "moment"
+
+
+def _loads_leaving(loads: Loads, filament: Filament, normal: Vector, axis: int) -> Iterator[str]:
+    for name in ("force", "weight"):
+        value = getattr(loads, name)
+        if value is not None and _along(value, normal, filament):
+            yield name
+    if loads.body_force is not None and not _zero(loads.body_force[axis]):
+        yield "body_force"
+    for name in ("moment", "internal_moment"):
+        value = getattr(loads, name)
+        if value is not None and not _zero(value[1 - axis]):
+            yield name
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _unit(a: Vector) -> Vector | None:
+    size = math.hypot(*a)
+    return (a[0] / size, a[1] / size, a[2] / size) if size > 0.0 else None
+
+
+def _directors(filament: Filament) -> tuple[Vector, Vector, Vector] | None:
+    """e1, e2, e3 where the filament stands; None where direction and normal do not give them."""
+    e3 = _unit(filament.direction)
+    e2 = _unit(_cross(e3, filament.normal)) if e3 else None
+    return (_cross(e2, e3), e2, e3) if e2 and e3 else None
+
+
+def _across(normal: Vector) -> list[Vector]:
+    """Two unit vectors normal to ``normal``."""
+    start = (1.0, 0.0, 0.0) if abs(normal[0]) < 0.9 else (0.0, 1.0, 0.0)
+    first = _unit(_cross(normal, start))
+    assert first is not None
+    return [first, _cross(normal, first)]
+
+
+def _along(components: Components, normal: Vector, filament: Filament) -> bool:
+    """Whether a vector, at some s and t, has a component along ``normal``."""
+    for fraction, t in ((0.0, 0.0), (0.31, 0.17), (0.77, 0.53), (1.0, 1.3)):
+        values = dict(zip("xyz", filament.position, strict=True), s=fraction * filament.length, t=t)
+        if _component(components, normal, values):
+            return True
+    return False
+
+
+def _flow_leaves(fluid: Fluid, filament: Filament, directors: tuple[Vector, Vector, Vector], axis: int) -> bool:
+    """Whether the flow, at some points of the plane and some times, leads out of it."""
+    assert fluid.flow is not None
+    inside = (directors[1 - axis], directors[2])
+    for a, b, t in ((0.0, 0.0, 0.0), (0.3, 0.1, 0.17), (-0.2, 0.4, 0.53), (-0.4, -0.3, 1.3)):
+        place = [p + filament.length * (a * u + b * v) for p, u, v in zip(filament.position, *inside, strict=True)]
+        if _component(fluid.flow, directors[axis], dict(zip("xyz", place, strict=True), t=t)):
+            return True
+    return False
+
+
+def _component(components: Components, normal: Vector, values: dict[str, float]) -> bool:
+    """Whether the vector has a component along ``normal`` that is more than round-off."""
+    try:
+        vector = [c.at(**values) if isinstance(c, Expression) else c for c in components]
+    except ExpressionError:
+        return False
+    return abs(_dot(vector, normal)) > 1e-9 * math.hypot(*vector)

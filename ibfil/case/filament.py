@@ -1,0 +1,245 @@
+"""The tables of a filament in a case file: each key with its default and its meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field
+
+from .expressions import Expression
+from .shape import AnyShape, Straight
+from .table import ORIGIN, ZERO, Table
+from .values import (
+    Count,
+    Formula,
+    Listed,
+    NotNegative,
+    OfS,
+    OfST,
+    OfT,
+    PairST,
+    Positive,
+    Range,
+    Real,
+    Seed,
+    TripleST,
+    TripleSTXYZ,
+    TripleT,
+    Vector,
+    Whole,
+    by_kind,
+    tagged,
+)
+
+
+class AnyLaw(Table):
+    """What all constitutive laws have."""
+
+    kind: str
+
+    @property
+    def linear(self) -> bool:
+        """Whether moments are those of Eq. 9."""
+        return self.kind == "linear"
+
+
+class Linear(AnyLaw):
+    """M = A (O - kappa), the paper's Eq. 4."""
+
+    kind: Literal["linear"] = Field("linear", description="moment proportional to the strain's excess")
+
+
+class Stiffening(AnyLaw):
+    """A moment that grows faster than the strain."""
+
+    kind: Literal["stiffening"] = Field(
+        "stiffening", description="the linear moment times 1 + coefficient |excess strain|^exponent"
+    )
+    coefficient: Real = Field(description="size of the added term, length^exponent", examples=[1.0])
+    exponent: Positive = Field(description="power of the excess strain in it", examples=[2.0])
+
+
+class TwoWell(AnyLaw):
+    """Two preferred twists with a barrier between them; the modulus ``twisting`` is then not used."""
+
+    kind: Literal["two-well"] = Field(
+        "two-well", description="two preferred twists instead of one; needs twisting, whose number is then not used"
+    )
+    wells: Range = Field(description="the two preferred values of Omega3 - twist_rate", examples=[[-1.0, 1.0]])
+    barrier: Positive = Field(description="energy per length between the wells", examples=[1.0])
+    gradient: NotNegative = Field(
+        description="g in the energy g/2 (dOmega3/ds)^2 per length; a wall is (w2 - w1) sqrt(g/(8 barrier)) wide",
+        examples=[0.1],
+    )
+
+
+Law = Annotated[
+    Annotated[Linear, tagged("linear")]
+    | Annotated[Stiffening, tagged("stiffening")]
+    | Annotated[TwoWell, tagged("two-well")],
+    by_kind("linear", "linear", "stiffening", "two-well"),
+]
+
+
+class Spring(Table):
+    """A tether of one end."""
+
+    stiffness: NotNegative = Field(description="force per displacement", examples=[1.0])
+    to: Vector = Field(ORIGIN, description="the point it pulls to")
+
+
+class End(Table):
+    """One end of a filament."""
+
+    end: Literal["free", "hinged", "clamped"] = Field(
+        "free", description="free (M = 0), hinged (r held, M = 0) or clamped (r, e3 held)"
+    )
+    twist: Literal["held", "free"] = Field(
+        "free", description="clamped only: e1 held or free; held by default at a clamped end"
+    )
+    spin: OfT | None = Field(None, description="clamped, twist held: rate of e1 about e3, rad/time")
+    angle: OfT | None = Field(None, description="the same as an angle, rad, instead of spin")
+    tangent: Vector | None = Field(None, description="clamped: e3; absent: the start shape's")
+    moves: TripleT | None = Field(
+        None, description="held ends: displacement of the held point; what counts is its change since t = 0"
+    )
+    force: TripleT | None = Field(None, description="external force on the end, lab frame")
+    follower: OfT | None = Field(None, description="external force along +e3; at finish negative compresses")
+    moment: TripleT | None = Field(None, description="external moment")
+    frame: Literal["lab", "body"] = Field("lab", description="axes of moment: lab, or along e1, e2, e3")
+    spring: Spring | None = Field(None, description="tether of this end")
+
+    @property
+    def held(self) -> bool:
+        """Whether the end's position is given."""
+        return self.end != "free"
+
+    @property
+    def clamped(self) -> bool:
+        """Whether the end's tangent is given, and it carries a moment."""
+        return self.end == "clamped"
+
+    @property
+    def turn_held(self) -> bool:
+        """Whether e1 is given there, at rest or turning."""
+        return self.clamped and self.twist != "free"
+
+    @property
+    def body_frame(self) -> bool:
+        """Whether ``moment`` is given along e1, e2, e3."""
+        return self.frame == "body"
+
+
+class Tether(Table):
+    """Springs along the whole filament."""
+
+    stiffness: NotNegative = Field(description="force per length per displacement", examples=[1.0])
+    to: Annotated[
+        Annotated[Literal["initial"], tagged("word")] | Annotated[TripleST, tagged("list")],
+        Discriminator(lambda value: "<list>" if isinstance(value, list) else "<word>"),
+    ] = Field("initial", description="the shape it pulls to")
+
+    @property
+    def places(self) -> tuple[Expression, Expression, Expression] | None:
+        """The shape it pulls to, as expressions; None: that of the start."""
+        return None if isinstance(self.to, str) else self.to
+
+
+class Loads(Table):
+    """Loads per length along the filament."""
+
+    force: TripleSTXYZ | None = Field(None, description="force per length, lab frame")
+    body_force: TripleST | None = Field(None, description="force per length along e1, e2, e3")
+    moment: TripleST | None = Field(
+        None, description="active moment per length along e1, e2, e3; enters e3 x m and Eq. 36"
+    )
+    internal_moment: PairST | None = Field(None, description="added to M1, M2 as -A kappa is (Sec. 7.2)")
+    weight: Vector | None = Field(None, description="constant force per length, lab frame")
+    tether: Tether | None = Field(None, description="springs per length to a shape")
+
+
+class Copies(Table):
+    """The same filament in many places."""
+
+    count: Count | None = Field(None, description="how many, placed at random in region")
+    seed: Seed = Field(1, description="seed of the random places")
+    region: Annotated[tuple[Vector, Vector], Listed(2)] | None = Field(
+        None, description="two corners of the box they are placed in"
+    )
+    orientation: Literal["random", "same"] = Field(
+        "random", description="how they are turned: each by a random rotation, or not at all"
+    )
+    file: str | None = Field(
+        None,
+        description="csv of the places, instead of count and region: a row x, y, z a copy, or x, y, z and a quaternion "
+        "qx, qy, qz, qw that turns it",
+    )
+
+    @property
+    def turned_alike(self) -> bool:
+        """Whether copies are not turned."""
+        return self.orientation == "same"
+
+
+class Filament(Table):
+    """One elastic rod."""
+
+    length: Positive = Field(description="rest length L", examples=[1.0])
+    nodes: Annotated[int, Whole(low=5)] = Field(
+        description="number of nodes, at least 8 with derivative 6 and 5 with 2", examples=[41]
+    )
+    spacing: Annotated[Expression | Literal["even"], Formula(("even",), ("q",))] = Field(
+        "even", description="s/L of the nodes for q from 0 to 1, increasing"
+    )
+    derivative: Annotated[int, Whole(choices=(2, 6))] = Field(
+        6, description="order of the stencils of r', r''; 2 by default where [thermal] stands"
+    )
+    force: Literal["eq44", "torque-free"] = Field("eq44", description="discrete force: Eq. 44 or torque-free")
+    bending: Annotated[tuple[OfS, OfS], Listed(2, repeat=True)] = Field(
+        description="bending moduli A, or [A1, A2], > 0", examples=[1.0]
+    )
+    twisting: OfS | None = Field(None, description="twist modulus C > 0; absent: no twist, planar scenes only")
+    stretching: OfS = Field(description="axial stiffness EA > 0, a force (the paper's sigma0)", examples=[1e4])
+    radius: OfS | None = Field(None, description="material radius > 0; required with twisting unless drag gives spin")
+    law: Law = Field(Linear(), description="moment against strain")
+    curvature: PairST = Field((ZERO, ZERO), description="preferred curvatures kappa1, kappa2")
+    twist_rate: OfST = Field(ZERO, description="preferred twist tau0")
+    position: Vector = Field(ORIGIN, description="where anchor stands; the box is centred on the origin")
+    anchor: Literal["start", "middle", "centroid"] = Field("middle", description="the point put at position")
+    direction: Vector = Field((1.0, 0.0, 0.0), description="where align points")
+    align: Literal["auto", "axis", "tangent", "chord"] = Field(
+        "auto",
+        description="what points along direction; auto: axis for helix and relaxed, else tangent (e3(0))",
+    )
+    normal: Vector = Field((0.0, 0.0, 1.0), description="e1 at s = 0, made normal to e3")
+    copies: Copies | None = Field(None, description="many of them, called NAME_000, NAME_001 ...")
+    shape: AnyShape = Field(Straight(), description="shape at t = 0")
+    start: End = Field(End(), description="the end at s = 0")
+    finish: End = Field(End(), description="the end at s = L")
+    loads: Loads | None = Field(None, description="loads per length")
+
+    @property
+    def aligned(self) -> str:
+        """What of the shape points along ``direction``: axis, tangent or chord."""
+        if self.align != "auto":
+            return self.align
+        return "axis" if self.shape.has_axis else "tangent"
+
+
+def copy_name(name: str, number: int) -> str:
+    """What copy ``number``, from 0 on, of a filament is called: NAME_003."""
+    return f"{name}_{number:03d}"
+
+
+def single(filaments: Mapping[str, Filament], name: str) -> Filament | None:
+    """The one filament that ``name`` means: one without copies, or a copy by its own name, NAME_003; else None."""
+    whole = filaments.get(name)
+    if whole is not None and whole.copies is None:
+        return whole
+    stem, _, digits = name.rpartition("_")
+    many = filaments.get(stem)
+    if many is None or many.copies is None or not (digits.isascii() and digits.isdigit()):
+        return None
+    number, count = int(digits), many.copies.count
+    return many if copy_name(stem, number) == name and (count is None or number < count) else None

@@ -1,0 +1,107 @@
+"""The tables [fluid] and [contact] of a case."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field
+
+from .table import Table
+from .values import (
+    Cells,
+    NotNegative,
+    Positive,
+    Sizes,
+    TripleXYZT,
+    tagged,
+)
+
+
+class Contact(Table):
+    """What happens where filaments touch."""
+
+    action: Literal["stop", "warn", "repel"] = Field("stop", description="what to do at contact")
+    distance: Positive | None = Field(None, description="distance of the axes at contact; absent: the sum of radii")
+    strength: Positive = Field(1.0, description="repel: force at contact; the range is distance")
+
+
+class Matched(Table):
+    """Drag of a straight rod in the grid."""
+
+    matched: Positive = Field(description="length of the straight rod drag is calibrated on", examples=[1.0])
+
+
+class Coefficients(Table):
+    """Drag per length, given."""
+
+    perp: Positive = Field(description="drag per length across the rod", examples=[1.0])
+    par: Positive = Field(description="drag per length along the rod", examples=[1.0])
+    spin: Positive | None = Field(None, description="torque per length and rate of spin")
+
+
+def _drag(value: object) -> str:
+    """Which member of the union of drags a value is meant to be."""
+    if isinstance(value, dict):
+        return "<matched>" if "matched" in value else "<coefficients>"
+    return "<word>"
+
+
+class Fluid(Table):
+    """The fluid, and the grid it is solved on."""
+
+    model: Literal["rft", "stokes", "navier-stokes"] = Field(description="which fluid", examples=["rft"])
+    viscosity: Positive = Field(description="viscosity eta", examples=[1.0])
+    density: Positive | None = Field(None, description="required by navier-stokes")
+    flow: TripleXYZT | None = Field(
+        None, description="background velocity; navier-stokes: uniform or box-periodic, maintained"
+    )
+    drag: Annotated[
+        Annotated[Literal["paper", "slender"], tagged("word")]
+        | Annotated[Matched, tagged("matched")]
+        | Annotated[Coefficients, tagged("coefficients")],
+        Discriminator(_drag),
+    ] = Field("paper", description="rft: 4 pi eta, 2 pi eta | slender body | matched to the grid | given")
+    box: Sizes | None = Field(None, description="periodic box, required by grid fluids")
+    cells: Cells | None = Field(None, description="cells along x, y, z, one h on all axes; or thickness")
+    thickness: Positive | None = Field(None, description="hydrodynamic line radius that chooses the cells")
+    kernel: Literal["roma3", "peskin4", "bspline4", "bspline6", "bkp6", "es4", "es5", "es6"] = Field(
+        "peskin4", description="delta function"
+    )
+    slip: NotNegative = Field(0.01, description="slip mobility eps (numerics 4.3), 0 = off")
+    method: Literal["auto", "fft", "pruned", "table", "krylov"] = Field(
+        "auto", description="how velocities are found; auto decides by counts"
+    )
+    precision: Literal["double", "single"] = Field("double", description="of the table, and of fields with inertia")
+    rotation: Literal["local", "grid"] = Field(
+        "local", description="e1 turns against the rod's own drag, or by torque coupling; needs twisting"
+    )
+
+    @property
+    def on_grid(self) -> bool:
+        """Whether nodes move the fluid of a grid."""
+        return self.model != "rft"
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the fluid has inertia, and so a history."""
+        return self.model == "navier-stokes"
+
+    @property
+    def couples_torque(self) -> bool:
+        """Whether twist torques of rods that twist act on the fluid, and its vorticity turns them."""
+        return self.on_grid and self.rotation == "grid"
+
+    @property
+    def single(self) -> bool:
+        """Whether tables, and fields with inertia, are of single precision."""
+        return self.precision == "single"
+
+    @property
+    def drag_matched(self) -> Matched | None:
+        """The straight rod on whose drag in the case's grid that of resistive-force theory is calibrated, if it is."""
+        return self.drag if isinstance(self.drag, Matched) else None
+
+    @property
+    def calibrated(self) -> Matched | None:
+        """The same where drag is what the fluid is made of; None: it is on the grid itself."""
+        return None if self.on_grid else self.drag_matched

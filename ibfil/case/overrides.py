@@ -1,0 +1,92 @@
+"""TOML read within limits, and KEY=VALUE on the command line: one key of a case replaced, by its dotted path."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from typing import Any, get_origin
+
+from .expressions import suggestion
+from .faults import ROOT, Entry, Fault, dotted, members, shown, step_into, unknown_key
+
+MAX_DEPTH = 16  # of tables and lists in each other
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""  # of a dotted key
+_LONG_KEY = re.compile(rf"(?:{_PART}\s*\.\s*){{{MAX_DEPTH}}}")
+NAMED = ("filament", "observe", "expect")  # tables whose names are the user's
+FORM = "KEY=VALUE, KEY a dotted path such as fluid.viscosity or stop.0.below"
+
+
+def load(text: str) -> dict[str, Any]:
+    """The content of a TOML text. Raises ValueError: not TOML, or nested deeper than any case is."""
+    if _LONG_KEY.search(text):  # tomllib takes minutes over keys of many thousand parts
+        raise ValueError(f"a key of more than {MAX_DEPTH} parts")
+    try:
+        content = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    layer: list[Any] = [content]
+    for _ in range(MAX_DEPTH):
+        inner = [entry.values() if isinstance(entry, dict) else entry for entry in layer]
+        layer = [value for values in inner for value in values if isinstance(value, dict | list)]
+    if layer:
+        raise ValueError("nested too deeply")
+    return content
+
+
+def split(text: str) -> tuple[list[str], Any] | Fault:
+    """The path and the value of ``KEY=VALUE``; what is not TOML is a text, so ``fluid.model=rft`` works."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    path = key.split(".")
+    if not equals or not all(path):
+        return Fault("command line", shown(text), FORM)
+    try:
+        table = load(f"value = {value}")
+    except ValueError:
+        table = {}
+    return path, table["value"] if set(table) == {"value"} else value
+
+
+def apply(raw: dict[str, Any], path: list[str], value: Any) -> dict[str, Any] | Fault:
+    """The content ``raw`` with the key ``path`` set, making tables the schema knows; or the fault."""
+    changed = copy.deepcopy(raw)
+    entry, table = ROOT, changed
+    for depth, part in enumerate(path):
+        here = (*path[: depth + 1],)
+        if isinstance(table, list):
+            fault = _bad_number(here, table)
+            if fault:
+                return fault
+        elif not isinstance(table, dict):
+            above = dotted(here[:-1])
+            return Fault(dotted(here), f"{above} = {shown(table)}", f"a table there; write {above}={{...}}")
+        inner = step_into(entry, int(part) if isinstance(table, list) else part)
+        if inner is None:
+            return unknown_key(entry, here)
+        if here[0] == "parameters" and depth == 1 and part not in table:
+            return Fault(dotted(here), f"no such parameter{suggestion(part, table)}", ", ".join(table) or "none here")
+        last = depth == len(path) - 1
+        if here[0] in NAMED and depth == 1 and not last and part not in table and suggestion(part, table):
+            return Fault(dotted(here), f"no such {here[0]}{suggestion(part, table)}", ", ".join(table))
+        index = int(part) if isinstance(table, list) else part
+        if last:
+            table[index] = value
+        elif isinstance(table, dict):
+            table = table.setdefault(part, _empty(inner))
+        else:
+            table = table[index]
+        entry = inner
+    return changed
+
+
+def _bad_number(path: tuple[str, ...], items: list[Any]) -> Fault | None:
+    """The fault of a list entry that is not there."""
+    if path[-1].isascii() and path[-1].isdigit() and len(path[-1]) < 6 and int(path[-1]) < len(items):
+        return None
+    allowed = f"a number from 0 to {len(items) - 1}" if items else "nothing: there is no such list"
+    return Fault(dotted(path), f"no entry {path[-1]}", allowed)
+
+
+def _empty(entry: Entry) -> Any:
+    """What a table or list that is not in the file starts as."""
+    return [] if all(get_origin(member) is tuple for member in members(entry.hint)) else {}

@@ -1,0 +1,302 @@
+"""Reading a case: TOML, overrides, parameters, schema, checks; one frozen Case, or all faults at once."""
+
+from __future__ import annotations
+
+import copy
+import keyword
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import BaseModel, ValidationError
+
+from ..errors import CaseError
+from .consistency import check
+from .expressions import (
+    CONSTANTS,
+    FUNCTIONS,
+    VARIABLES,
+    BrokenParameter,
+    Expression,
+    ExpressionError,
+    Parameters,
+    parse,
+)
+from .faults import Fault, Found, dotted, example, found_by_pydantic, shown
+from .fluid import Coefficients, Matched
+from .overrides import apply, load, split
+from .schema import Case, Scene
+from .values import keys
+
+MAX_BYTES = 1_000_000
+_NAME = re.compile(r"[A-Za-z0-9_-]+")
+_NUMBERS = ("value", "range", "tolerance", "absolute")  # of [expect.NAME], which its quick form may replace
+
+
+def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+    """The case in the file ``path``, with ``KEY=VALUE`` overrides. Raises CaseError, one line a fault."""
+    try:
+        with Path(path).open("rb") as file:
+            text = file.read(MAX_BYTES + 1).decode("utf-8-sig")
+    except OSError as error:
+        raise CaseError([f"{path}: cannot be read ({error.strerror})"]) from None
+    except UnicodeDecodeError as error:
+        raise CaseError([f"{path}: not a text file (byte {error.start} is not UTF-8)"]) from None
+    return parse_case(text, str(path), overrides)
+
+
+def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
+    """The case in the TOML ``text``, called ``name`` in messages. Raises CaseError, one line a fault."""
+    if len(text) > MAX_BYTES:
+        raise CaseError([f"{name}: {len(text)} characters; a case has at most {MAX_BYTES}"])
+    try:
+        raw = load(text)
+    except ValueError as error:
+        raise CaseError([f"{name}: not TOML: {error}"]) from None
+    raw, faults = _overridden(raw, [split(override) for override in overrides])
+    scene, more = _read(raw)
+    faults += more
+    faults += _quick_faults(raw, more)
+    if faults or scene is None:
+        raise CaseError(list(dict.fromkeys(fault.line(name) for fault in faults)))
+    return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name)
+
+
+def quick_case(case: Case, name: str) -> Case:
+    """The quick form of [expect.``name``]: the case with its ``quick`` overrides and numbers."""
+    raw, _ = _quick(load(case.text), name)
+    return parse_case(tomli_w.dumps(raw), case.file)
+
+
+def differences(a: Case, b: Case) -> dict[str, tuple[Any, Any]]:
+    """The keys, as dotted paths, whose values differ, with both; ``text`` and ``file`` are not compared."""
+    return {key: (one, other) for key, one, other in _differing(a, b, ()) if key not in ("text", "file")}
+
+
+def written(value: Any) -> str:
+    """A value of a case as its file has it, or nearly."""
+    if isinstance(value, Expression):
+        return value.text if value.constant is None else f"{value.constant:g}"
+    if isinstance(value, BaseModel):
+        inner = ", ".join(f"{key} = {written(getattr(value, key))}" for key in sorted(value.model_fields_set))
+        return f"{{ {inner} }}" if inner else "the default"
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(written, value)) + "]"
+    return "nothing" if value is None else shown(value)
+
+
+def idle_keys(case: Case) -> list[str]:
+    """The keys of the file that do nothing under its fluid and start shapes, and the parameters that nothing uses."""
+    raw = load(case.text)
+    fluid = case.fluid
+    idle: dict[str, list[str]] = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
+    if fluid.model == "rft":
+        grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "kernel", "slip"]
+        idle["fluid"] += [*grid, "method", "precision"]
+        spins = isinstance(fluid.drag, Matched) and fluid.rotation == "grid"
+        idle["fluid"] += [] if spins and any(f.twisting for f in case.filaments.values()) else ["rotation"]
+        idle["output"] += ["grid_every", "fields", "grid_stride", "probes"]
+    else:
+        turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())
+        spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None
+        idle["fluid"] += [] if turns and spin else ["drag"]
+    placing = ["position", "anchor", "direction", "align", "normal"]
+    idle |= {f"filament.{name}": placing for name, f in case.filaments.items() if f.shape.kind == "run"}
+    written = [f"{table}.{key}" for table, names in idle.items() for key in names if key in _table(raw, table)]
+    used = set(re.findall(r"[A-Za-z_]\w*", " ".join(_texts(raw))))
+    return written + [f"parameters.{key}" for key in raw.get("parameters", {}) if key not in used]
+
+
+def _table(raw: dict[str, Any], path: str) -> dict[str, Any]:
+    """The table of that path; empty where the file has none."""
+    for part in path.split("."):
+        raw = raw.get(part, {})
+    return raw
+
+
+def _overridden(
+    raw: dict[str, Any], overrides: Sequence[tuple[list[str], Any] | Fault]
+) -> tuple[dict[str, Any], list[Fault]]:
+    """The file's content with all overrides that can be applied, and the faults of the others."""
+    faults = []
+    for override in overrides:
+        changed = override if isinstance(override, Fault) else apply(raw, *override)
+        if isinstance(changed, Fault):
+            faults.append(changed)
+        else:
+            raw = changed
+    return raw, faults
+
+
+def _read(raw: dict[str, Any]) -> tuple[Scene | None, list[Fault]]:
+    """The scene of the file's content and no faults, or all the faults there are."""
+    faults = list(_bad_names(raw))
+    parameters = _parameters(raw.get("parameters"), faults)
+    filled = _fill_defaults(raw)
+    if isinstance(raw.get("parameters", {}), dict):
+        filled["parameters"] = {key: value for key, value in parameters.items() if value is not None}
+    scene, tainted = None, {fault.key for fault in faults}
+    # Another look without the faulty keys, so that what does not go together is told at once too.
+    for attempt in range(6):
+        try:
+            scene = Scene.model_validate(filled, context=parameters)
+            break
+        except ValidationError as error:
+            for found in found_by_pydantic(error, filled):
+                if attempt == 0 and found.fault:
+                    faults.append(found.fault)
+                tainted.update((dotted(found.path), *(found.fault.reads if found.fault else ())))
+                _prune(filled, found)
+    if scene is not None:
+        faults += [fault for fault in check(scene) if not fault.touches(tainted)]
+    return scene, faults
+
+
+def _bad_names(raw: dict[str, Any]) -> Iterator[Fault]:
+    """Names of tables become names in files and paths of keys, so they are plain."""
+    for table in ("filament", "observe", "expect"):
+        entries = raw.get(table)
+        for name in entries if isinstance(entries, dict) else ():
+            if not _NAME.fullmatch(name):
+                yield Fault(dotted((table, name)), f"the name {shown(name)}", "letters A-Z a-z, digits, _ and -")
+
+
+def _parameters(table: Any, faults: list[Fault]) -> Parameters:
+    """The values of [parameters], each an expression of earlier ones; None where one has a fault."""
+    values: dict[str, float | None] = {}
+    taken = {*FUNCTIONS, *CONSTANTS, *VARIABLES}
+    for name, value in table.items() if isinstance(table, dict) else ():
+        key = dotted(("parameters", name))
+        if name in taken:
+            what = "a function" if name in FUNCTIONS else "pi" if name in CONSTANTS else "a variable"
+            faults.append(Fault(key, f"a parameter named like {what}", f"any name but {' '.join(sorted(taken))}"))
+            continue
+        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name) or keyword.iskeyword(name):
+            faults.append(Fault(key, f"the name {shown(name)}", "a letter or _, then letters, digits and _"))
+            continue
+        try:
+            values[name] = parse(value, (), values).constant
+        except BrokenParameter:
+            values[name] = None
+        except ExpressionError as error:
+            values[name] = None
+            why = f" ({error})" if isinstance(value, str) else ""
+            faults.append(Fault(key, shown(value) + why, "a number or an expression of earlier parameters"))
+    return values
+
+
+def _fill_defaults(raw: dict[str, Any]) -> dict[str, Any]:
+    """A copy of the file's content in which the defaults that depend on other tables stand."""
+    filled = copy.deepcopy(raw)
+
+    def table(*path: str) -> dict[str, Any]:
+        """The table of that path, or one that is thrown away where the file has none."""
+        found: Any = filled
+        for part in path:
+            found = found.get(part) if isinstance(found, dict) else None
+        return found if isinstance(found, dict) else {}
+
+    filaments = table("filament")
+    for name in filaments:
+        if "thermal" in filled:
+            table("filament", name).setdefault("derivative", 2)
+        for end in (table("filament", name, "start"), table("filament", name, "finish")):
+            if end.get("end") == "clamped":
+                end.setdefault("twist", "held")
+    table("thermal").setdefault("twist", any("twisting" in table("filament", name) for name in filaments))
+    scheme = table("time").setdefault("scheme", "semi-implicit" if "thermal" in filled else "implicit")
+    table("time").setdefault("order", 2 if scheme == "implicit" else 1)
+    for name in table("observe"):
+        if len(filaments) == 1:
+            table("observe", name).setdefault("filament", next(iter(filaments)))
+    for name in table("expect"):
+        if "value" in table("expect", name) and "absolute" not in table("expect", name):
+            table("expect", name).setdefault("tolerance", 0.01)
+    return filled
+
+
+def _prune(filled: dict[str, Any], found: Found) -> None:
+    """Take the faulty key out, or put an example in where a required one is missing."""
+    value: Any = filled
+    table, key = filled, ""
+    for part in found.path:
+        if isinstance(value, dict):
+            table, key = value, str(part)
+            value = value.get(key)
+        elif isinstance(value, list):
+            value = value[int(part)]
+    if found.missing and key == found.path[-1]:
+        table[key] = copy.deepcopy(example(found.path))
+    else:
+        table.pop(key, None)
+
+
+def _quick(raw: dict[str, Any], name: str) -> tuple[dict[str, Any], list[Fault]]:
+    """The content of the file in the quick form of [expect.``name``], without any further one."""
+    quick = raw["expect"][name].get("quick", {})
+    raw = copy.deepcopy(raw)
+    for entry in raw["expect"].values():
+        if isinstance(entry, dict):
+            entry.pop("quick", None)
+    expect = raw["expect"][name]
+    replaced = {key: quick[key] for key in _NUMBERS if key in quick}
+    if {"value", "range"} & set(replaced):
+        expect.pop("value", None), expect.pop("range", None)
+    if {"tolerance", "absolute", "range"} & set(replaced):
+        expect.pop("tolerance", None), expect.pop("absolute", None)
+    expect.update(replaced)
+    return _overridden(raw, [leaf for leaf in _leaves(quick, ()) if leaf[0][0] not in _NUMBERS])
+
+
+def _leaves(table: dict[str, Any], path: tuple[str, ...]) -> Iterator[tuple[list[str], Any]]:
+    """The dotted paths of a table of overrides, with their values."""
+    for key, value in table.items():
+        here = (*path, *key.split("."))
+        if isinstance(value, dict):
+            yield from _leaves(value, here)
+        else:
+            yield list(here), value
+
+
+def _quick_faults(raw: dict[str, Any], known: Sequence[Fault]) -> Iterator[Fault]:
+    """What is wrong with the quick forms, and not with the case itself."""
+    entries = raw.get("expect")
+    for name, entry in entries.items() if isinstance(entries, dict) else ():
+        if not (isinstance(entry, dict) and isinstance(entry.get("quick"), dict) and entry["quick"]):
+            continue
+        quick, faults = _quick(raw, name)
+        for fault in faults + _read(quick)[1]:
+            if fault not in known:
+                key = f"expect.{name}.quick"
+                yield Fault(key, f"an override with {fault.key}: {fault.found}", fault.allowed)
+
+
+def _differing(a: Any, b: Any, path: tuple[str | int, ...]) -> Iterator[tuple[str, Any, Any]]:
+    """The paths at which two descriptions differ, and what stands there in each."""
+    if isinstance(a, BaseModel) and type(a) is type(b):
+        names = {name: key for key, name in keys(type(a)).items()}
+        for name, key in names.items():
+            yield from _differing(getattr(a, name), getattr(b, name), (*path, key))
+    elif isinstance(a, dict) and isinstance(b, dict):
+        for key in dict.fromkeys((*a, *b)):
+            yield from _differing(a.get(key), b.get(key), (*path, key))
+    elif isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
+        for i, (one, other) in enumerate(zip(a, b, strict=True)):
+            yield from _differing(one, other, (*path, i))
+    elif a != b:
+        yield dotted(path), a, b
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """The texts in the file's content in which a parameter may stand."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, list):
+        for item in value:
+            yield from _texts(item)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            if key not in ("title", "source", "units", "path", "file"):
+                yield from _texts(item)

@@ -1,0 +1,220 @@
+"""Every table and key of a case file, as frozen descriptions: each key with its default and its meaning.
+
+The tables of a filament are in ``case_filament``. What one value may be is in ``case_values``; what does not
+go together is in ``case_checks``. Some defaults depend on other tables: ``case.parse_case`` fills those in
+before it reads, and the text here says so.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .filament import Filament
+from .fluid import Contact, Fluid
+from .table import Table
+from .values import (
+    Count,
+    Listed,
+    NotNegative,
+    Number,
+    Place,
+    Positive,
+    Range,
+    Real,
+    Seed,
+    Vector,
+    Whole,
+)
+
+
+class Units(Table):
+    """Labels only, stored with every dataset; nothing is converted."""
+
+    length: str = Field("1", description="label of lengths")
+    force: str = Field("1", description="label of forces")
+    time: str = Field("1", description="label of times")
+
+
+class Thermal(Table):
+    """Thermal noise."""
+
+    energy: NotNegative = Field(description="thermal energy kT", examples=[0.0])
+    seed: Seed = Field(1, description="seed of the random numbers")
+    directions: Literal["xyz", "xy"] = Field("xyz", description="xy: no lab z component")
+    twist: bool = Field(True, description="thermal twist moment; false by default where nothing has twisting")
+
+    @property
+    def planar(self) -> bool:
+        """Whether there are none along the lab's z."""
+        return self.directions == "xy"
+
+
+class Time(Table):
+    """How far, by which steps."""
+
+    end: Positive = Field(description="the run's last time", examples=[1.0])
+    step: Annotated[float | Literal["auto"], Number(("auto",), low=0)] = Field("auto", description="time step")
+    tolerance: Positive | None = Field(None, description="rms node error / L a unit time: adaptive steps")
+    max_steps: Count = Field(1_000_000, description="the run stops with an error after so many steps")
+    min_step: Positive = Field(1e-10, description="the run stops with an error below it")
+    scheme: Literal["explicit", "semi-implicit", "implicit"] = Field(
+        "implicit", description="how a step is taken; with [thermal] semi-implicit, by default"
+    )
+    order: Annotated[int, Whole(choices=(1, 2))] = Field(
+        2, description="order in time: 2 with implicit only; 1 by default with the others"
+    )
+
+    @property
+    def automatic(self) -> bool:
+        """Whether the scene chooses the step."""
+        return self.step == "auto"
+
+    @property
+    def explicit(self) -> bool:
+        """Whether steps have the limit of forward Euler."""
+        return self.scheme == "explicit"
+
+
+class Steady(Table):
+    """A value that has settled."""
+
+    over: Positive = Field(description="length of the time window", examples=[1.0])
+    change: Positive = Field(description="relative change within it", examples=[1e-3])
+
+
+class Stop(Table):
+    """A reason to end the run before its time; the first true one ends it."""
+
+    observe: str = Field(description="name of an [observe.NAME]", examples=["name"])
+    below: Real | None = Field(None, description="true below this value")
+    above: Real | None = Field(None, description="true above this value")
+    steady: Steady | None = Field(None, description="true when the value has settled")
+    after: NotNegative = Field(0.0, description="not before this time")
+    hold: NotNegative = Field(0.0, description="must hold so long")
+
+
+class Observe(Table):
+    """A number (or vector) taken at every output."""
+
+    kind: Literal[
+        "position",
+        "velocity",
+        "speed",
+        "displacement",
+        "drift",
+        "end_to_end",
+        "amplitude",
+        "radius",
+        "turn_angle",
+        "circularity",
+        "growth",
+        "frequency",
+        "diffusion_ratio",
+        "stretch",
+        "twist",
+        "force",
+        "torque",
+        "power",
+        "dissipation",
+        "efficiency",
+    ] = Field(description="what is taken; each is explained at the end of `ibfil schema`", examples=["speed"])
+    filament: str = Field("", description="name of a filament; needed where there are several")
+    at: Annotated[
+        float | tuple[float, float] | Literal["start", "finish", "middle", "centroid"],
+        Place(("start", "finish", "middle", "centroid")),
+    ] = Field("finish", description="where: a point, an arclength, or a window [s1, s2]")
+    along: Vector | None = Field(None, description="component or axis, where the kind has one")
+    space: Literal["none", "mean", "max", "min"] = Field("none", description="over the window")
+    over: Range | None = Field(None, description="time window; absent: the whole run")
+    interval: NotNegative = Field(0.0, description="diffusion_ratio: the lag")
+    summary: Literal["last", "mean", "max", "min", "median"] = Field(
+        "last", description="over `over`: the number in the summary and in [expect]"
+    )
+
+    @property
+    def reduces(self) -> bool:
+        """Whether it says what is to be taken over the points of a window."""
+        return self.space != "none"
+
+
+class Expect(Table):
+    """A number the result is held against by `ibfil verify`."""
+
+    observe: str = Field(description="name of an [observe.NAME]", examples=["name"])
+    value: Real | None = Field(None, description="the expected number")
+    range: Range | None = Field(None, description="or the range [lo, hi] it must lie in")
+    tolerance: NotNegative | None = Field(None, description="relative error allowed; 0.01 by default with value")
+    absolute: NotNegative | None = Field(None, description="or the absolute error allowed")
+    source: str = Field("", description="where the number comes from")
+    quick: dict[str, object] = Field(
+        {},
+        description="overrides of the quick form; value, range, tolerance, absolute replace those above",
+    )
+
+
+class Output(Table):
+    """What is written, and when."""
+
+    every: Positive | None = Field(None, description="time between outputs, hit exactly; this or times is required")
+    times: Annotated[tuple[NotNegative, ...], Listed()] | None = Field(None, description="the times, instead of every")
+    grid_every: Positive | None = Field(None, description="time between fields; absent: none written")
+    fields: Annotated[tuple[Literal["velocity", "vorticity", "pressure"], ...], Listed()] = Field(
+        ("velocity",), description="which fields"
+    )
+    grid_stride: Count = Field(1, description="every so many cells of a field")
+    probes: Annotated[tuple[Vector, ...], Listed()] = Field((), description="points whose velocity is written")
+    checkpoint_every: Positive = Field(60.0, description="wall seconds between checkpoints")
+
+
+class Compute(Table):
+    """How it is computed."""
+
+    threads: Count = Field(1, description="how many threads")
+
+
+class Scene(Table):
+    """The whole file."""
+
+    title: str = Field("", description="what it shows")
+    source: str = Field("", description="citation")
+    units: Units = Field(Units(), description="labels only")
+    parameters: dict[str, Real] = Field({}, description="NAME = number or constant expression of earlier ones")
+    filaments: dict[str, Filament] = Field(
+        alias="filament",
+        min_length=1,
+        description="one table a filament",
+        examples=[{"name": {"length": 1.0, "nodes": 41, "bending": 1.0, "stretching": 1e4}}],
+    )
+    contact: Contact | None = Field(None, description="absent: not looked for")
+    fluid: Fluid = Field(description="the fluid", examples=[{"model": "rft", "viscosity": 1.0}])
+    thermal: Thermal | None = Field(None, description="thermal noise, rft only")
+    time: Time = Field(description="how far, by which steps", examples=[{"end": 1.0}])
+    stops: Annotated[tuple[Stop, ...], Listed()] = Field((), alias="stop", description="reasons to end early")
+    observe: dict[str, Observe] = Field({}, description="numbers taken at every output")
+    expect: dict[str, Expect] = Field({}, description="numbers to hold the result against")
+    output: Output = Field(description="what is written, and when", examples=[{"every": 0.1}])
+    compute: Compute = Field(Compute(), description="how it is computed")
+
+    @property
+    def twists(self) -> bool:
+        """Whether any filament twists."""
+        return any(filament.twisting is not None for filament in self.filaments.values())
+
+    @property
+    def couples_torque(self) -> bool:
+        """Whether twist torques go onto the grid."""
+        return self.fluid.couples_torque and self.twists
+
+    @property
+    def dissipation_observed(self) -> list[str]:
+        """The observables of the heat that the fluid makes: an evaluation of it at each output."""
+        return [name for name, one in self.observe.items() if one.kind == "dissipation"]
+
+
+class Case(Scene):
+    """A checked case. ``text`` is its resolved TOML, overrides included; ``file`` the name it goes by."""
+
+    text: str
+    file: str

@@ -1,0 +1,1 @@
+"""What `ibfil check` says: what is modelled, dimensionless groups, costs, warnings."""

@@ -1,0 +1,61 @@
+"""What a run takes: bytes of memory and disk, and the share of each modelled term in a step. Counted, not measured.
+
+Only what a case names is counted, because only that is built. Shares of time are of one step, outputs spread over the
+steps between them; that of the rods and of the fluid are those by which the method is chosen (assembly/costs.py), the
+rest was measured against them: twisting 0.7 of what bending and stretching take, contact 1.5, noise 0.1.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..assembly import costs
+from ..assembly.fluids.base import Term
+from ..assembly.fluids.on_grid import BAND
+
+if TYPE_CHECKING:
+    from ..simulation.simulation import Simulation
+
+_TWISTING = 0.7  # of the step of bending and stretching
+_CONTACT, _NOISE = 1.5, 0.1  # the same of an implicit one
+
+
+def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
+    """Return every term that the case names; ``memory`` are bytes of large arrays by what they are for."""
+    case, n = simulation.case, len(simulation.arclength)
+    unknowns, band = simulation.mechanics.unknowns, memory[BAND]
+    rods, implicit = costs.of_rods(case, n), costs.of_rods(case, n, "implicit")
+    out = [Term("bending and stretching", rods, band * 9 / unknowns**2)]
+    if unknowns == 4:
+        out.append(Term("twisting", _TWISTING * rods, band * 7 / 16))
+    if case.contact is not None:
+        out.append(Term("contact", _CONTACT * implicit, 8.0 * 30 * n))
+    if case.thermal is not None:
+        out.append(Term("thermal noise", _NOISE * implicit, 8.0 * unknowns * n))
+    return out + simulation.model.fluid_model.terms(simulation.rods, memory, simulation.step_length)
+
+
+def shares(found: list[Term]) -> list[tuple[str, float, float]]:
+    """Return (name, share of time, share of memory) of each term."""
+    time, size = sum(term.seconds for term in found), sum(term.bytes for term in found)
+    return [(term.name, term.seconds / time, term.bytes / size) for term in found]
+
+
+def memory(simulation: Simulation) -> dict[str, float]:
+    """Bytes of the large arrays, by what they are for."""
+    n, m = len(simulation.arclength), simulation.mechanics.unknowns
+    band = 8.0 * n * m * m * (2 * simulation.mechanics.profile.width + 1)
+    return {BAND: band, **simulation.model.fluid_model.memory(simulation.rods)}
+
+
+def disk(simulation: Simulation) -> float:
+    """Bytes of the run file, at most: fields are compressed."""
+    case, n = simulation.case, len(simulation.arclength)
+    outputs = len(case.output.times or ()) or case.time.end / (case.output.every or case.time.end) + 1
+    size = outputs * n * 8.0 * (20 if simulation.mechanics.unknowns == 3 else 26)
+    if simulation.grid is not None and case.output.grid_every is not None:
+        points = float(np.prod(np.ceil(simulation.grid.cells / case.output.grid_stride)))
+        size += (case.time.end / case.output.grid_every + 1) * points * 12.0 * len(case.output.fields)
+    return size

@@ -1,0 +1,40 @@
+"""The dimensionless groups of a scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..simulation import timescales
+
+if TYPE_CHECKING:
+    from ..case.filament import Filament
+    from ..simulation.simulation import Simulation
+
+
+def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
+    """The groups of one filament."""
+    case = simulation.case
+    bending, length = timescales.softest(filament), filament.length
+    out: dict[str, float] = {}
+    rate = max(simulation.driving_rates(), default=0.0)
+    if rate:
+        out["sperm number"] = length * (simulation.drag(filament) * rate / bending) ** 0.25
+    if simulation.cycles and case.time.tolerance is None:  # with one, steps are not known beforehand
+        out["omega dt"] = max(simulation.cycles) * simulation.step_length
+    stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
+    out["EA L^2/A"] = stretching * length**2 / bending
+    if case.thermal is not None and case.thermal.energy > 0:
+        out["A/(kT L)"] = bending / (case.thermal.energy * length)
+    return out | simulation.model.fluid_model.groups(filament, rate)
+
+
+def groups(simulation: Simulation) -> dict[str, float]:
+    """The dimensionless groups of the scene; with several filaments each name begins with the filament's."""
+    filaments = simulation.case.filaments
+    out: dict[str, float] = {}
+    for name, filament in filaments.items():
+        prefix = "" if len(filaments) == 1 else f"{name}: "
+        out.update({prefix + key: value for key, value in of_filament(simulation, filament).items()})
+    return out

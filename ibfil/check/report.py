@@ -1,0 +1,161 @@
+"""What `ibfil check` says: what a case models and what it does not, what it costs, which steps are stable."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..assembly.fluids.models import fluid_model
+from ..assembly.loads import ALONG, ON_ENDS, named
+from ..case.reading import idle_keys
+from ..simulation.simulation import Simulation
+from .budget import disk, memory, shares, terms
+from .dimensionless import groups
+from .warnings import warnings
+
+if TYPE_CHECKING:
+    from ..case.fluid import Contact
+    from ..case.schema import Case, Thermal
+
+
+def report(case: Case) -> str:
+    """The text of `ibfil check`. Raises CaseError where the scene cannot be built."""
+    simulation = Simulation(case)
+    parts = [case.title or case.file, ""]
+    parts += _section("modelled", modelled(case))
+    parts += _section("not modelled", absent(case))
+    parts += _section("dimensionless groups", [f"{k} = {v:.4g}" for k, v in groups(simulation).items()])
+    parts += _section("share of a step and of memory, from counts", share_lines(simulation))
+    parts += _section("size and cost", _costs(simulation))
+    parts += _section("step", _steps(simulation))
+    idle = idle_keys(case)
+    if idle:
+        parts += _section("idle keys (checked; not used by this fluid)", [", ".join(idle)])
+    parts += _section("warnings", warnings(simulation) or ["none"])
+    return "\n".join(parts).rstrip()
+
+
+def _section(title: str, lines: list[str]) -> list[str]:
+    return [f"{title}:", *(f"  {line}" for line in lines), ""]
+
+
+_MOTIONS = {"moves": "prescribed motion", "spin": "spin", "angle": "prescribed turn"}
+
+
+def modelled(case: Case) -> list[str]:
+    """Each term the case asks for, one line each."""
+    out = []
+    for name, f in case.filaments.items():
+        terms = ["bending", "stretching"] + (["twisting"] if f.twisting is not None else [])
+        if any(k.constant != 0 for k in (*f.curvature, f.twist_rate)):
+            terms.append("preferred strains")
+        if not f.law.linear:
+            terms.append(f"{f.law.kind} law")
+        for side, end in (("start", f.start), ("finish", f.finish)):
+            terms.append(f"{side} {end.end}")
+            terms += [f"{row.words} at {side}" for row in named(ON_ENDS, end)]
+            terms += [f"{words} at {side}" for key, words in _MOTIONS.items() if getattr(end, key) is not None]
+        terms += [row.words for row in named(ALONG, f.loads)]
+        out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
+    if case.fluid.flow is not None:
+        spins = "spins them by half its vorticity" if case.couples_torque else "does not spin them"
+        out.append(f"a background flow, which moves the nodes and {spins}")
+    if case.contact is not None:
+        out.append(_contact(case.contact))
+    out += fluid_model(case).modelled()
+    return out if case.thermal is None else [*out, _thermal(case.thermal)]
+
+
+def _contact(contact: Contact) -> str:
+    where = "the sum of radii" if contact.distance is None else f"{contact.distance:g}"
+    acts = {
+        "stop": "the first ends the run",
+        "warn": "the first is told",
+        "repel": f"repulsion of {contact.strength:g} at that distance, none at twice that",
+    }
+    return f"contact of axes nearer than {where}, looked for each step: {acts[contact.action]}"
+
+
+def _thermal(thermal: Thermal) -> str:
+    kinds = "forces and twist moments" if thermal.twist else "forces"
+    where = " in the plane z = const" if thermal.planar else ""
+    return f"thermal {kinds}{where}, kT = {thermal.energy:g}, seed {thermal.seed}"
+
+
+def absent(case: Case) -> list[str]:
+    """What is left out, and so costs nothing."""
+    out, fluid = [], fluid_model(case)
+    if not case.twists:
+        out.append("twist: no twist unknowns; e1 is carried along")
+    out += fluid.absent()
+    if case.fluid.flow is not None:
+        out.append("the flow's couple across a rod's thickness: a straight one turns towards a shear, never past it")
+    if case.output.grid_every is None:
+        out.append("field output")
+    if case.contact is None:
+        out.append("contact: filaments may pass through each other")
+    if case.thermal is None:
+        out.append("thermal noise")
+    elif not case.thermal.twist and case.twists:
+        out.append("thermal twist moments")
+    out.append(f"{fluid.inertia_absent}; walls; heads; closed rods")
+    return out
+
+
+def share_lines(simulation: Simulation) -> list[str]:
+    """Each term with its share of time and of memory."""
+    found = shares(terms(simulation, memory(simulation)))
+    width = max(len(name) for name, _, _ in found)
+    return [f"{name:{width}}  {100 * time:5.1f} % of time  {100 * size:5.1f} % of memory" for name, time, size in found]
+
+
+def _bytes(count: float) -> str:
+    for unit in ("B", "KiB", "MiB"):
+        if count < 1024:
+            return f"{count:.3g} {unit}"
+        count /= 1024
+    return f"{count:.3g} GiB"
+
+
+def _costs(simulation: Simulation) -> list[str]:
+    case, fluid = simulation.case, simulation.model.fluid_model
+    unknowns = simulation.mechanics.unknowns
+    lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
+    lines += fluid.size()
+    used = memory(simulation)
+    parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
+    lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
+    lines += fluid.remarks()
+    lines.append(f"disk at most {_bytes(disk(simulation))}, fields compressed")
+    methods = simulation.model.seconds
+    if len(methods) > 1:
+        others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
+        lines.append(f"seconds a step, from counts: {others}")
+    steps, seconds = case.time.end / simulation.step_length, methods[simulation.method]
+    may = "" if fluid.steps_known or not case.time.automatic else "at least "  # see step_lines
+    total = f"{may}about {steps:.0f} steps, {steps * seconds:.2g} s after start-up"
+    if case.time.tolerance is not None:
+        total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
+    lines.append(f"{total}, from counts (within a factor 3)")
+    return lines
+
+
+def _steps(simulation: Simulation) -> list[str]:
+    case = simulation.case
+    chosen = "automatic" if case.time.automatic else "given"
+    scheme = case.time.scheme if case.thermal is None else "linearised trapezoid (semi-implicit)"
+    length = f"dt = {simulation.step_length:.4g} ({chosen})"
+    if case.time.tolerance is not None:
+        length = f"dt = {simulation.step_length:.4g} at first, then what an error of {case.time.tolerance:g} allows"
+    lines = [
+        f"{scheme}, order {case.time.order}: {length}",
+        f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
+        "implicit and semi-implicit schemes: no such limit; accuracy decides",
+        *simulation.model.fluid_model.step_lines(),
+    ]
+    rates = simulation.driving_rates()
+    if rates and max(rates) > 0:
+        lines.append(f"shortest period of what drives the rods: {2 * np.pi / max(rates):.4g}")
+    lines.append(f"slowest bending time: {simulation.bending_time():.4g}")
+    return lines

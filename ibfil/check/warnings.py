@@ -1,0 +1,137 @@
+"""What in a scene should make its user look twice: it runs, but may not mean what is thought.
+
+What a fluid has to say of it is with its model (assembly/fluids).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..shapes import initial
+from .dimensionless import of_filament
+
+if TYPE_CHECKING:
+    from ..case.filament import Filament
+    from ..simulation.simulation import Simulation
+
+
+ACCURATE_OMEGA_DT = 0.3  # omega dt up to which the default scheme was measured to be accurate
+FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
+QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
+THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
+
+
+def warnings(simulation: Simulation) -> list[str]:
+    """One sentence for each thing that runs but may not mean what its user thinks."""
+    case, fluid, out = simulation.case, simulation.model.fluid_model, []
+    for name, filament in case.filaments.items():
+        key, found = f"filament.{name}", of_filament(simulation, filament)
+        out += fluid.warnings_of(simulation, name, found)
+        out += _of_held_ends(key, filament)
+        if not case.time.explicit and found.get("omega dt", 0.0) > 1.01 * ACCURATE_OMEGA_DT:
+            found_dt = f"omega dt = {found['omega dt']:.3g}"
+            out.append(f"time.step: {found_dt}; the schemes are accurate up to about {ACCURATE_OMEGA_DT}")
+        where = simulation.nodes(name)
+        out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
+    return out + _of_run(simulation) + fluid.warnings(simulation)
+
+
+def _of_held_ends(key: str, filament: Filament) -> list[str]:
+    """A displacement that is not zero as the run begins, and so does not displace."""
+    out = []
+    for side, end in (("start", filament.start), ("finish", filament.finish)):
+        begins = [] if end.moves is None else [float(part.bind("t")(0.0)) for part in end.moves]
+        if any(begins):
+            out.append(
+                f"{key}.{side}.moves: {begins} at t = 0, when the end stands where the shape puts it: only the change "
+                "from there moves it; begin at 0, as with -c*(1 - exp(-t/0.01))"
+            )
+    return out
+
+
+def _of_noise(simulation: Simulation) -> list[str]:
+    """What thermal forces ask of the rods and of the step (derivations.md, section 5)."""
+    case = simulation.case
+    out: list[str] = []
+    if case.thermal is None or case.thermal.energy == 0:
+        return out
+    for name, filament in case.filaments.items():
+        if filament.derivative == 6:
+            out.append(
+                f"filament.{name}.derivative: stencils of order 6 are not thermal: their stiffness is not symmetric, "
+                "and curvatures have 0.83 (inside) and 1.39 (at the ends) of their variance; take 2"
+            )
+        out += _softness(f"filament.{name}", filament, case.thermal.energy)
+    return out + _of_noisy_step(simulation)
+
+
+def _softness(key: str, filament, energy: float) -> list[str]:
+    """Where a segment's own fluctuations are not small: <strain^2> = kT/(EA ds), <angle^2> = kT ds/A between two."""
+    out, ds = [], filament.length / (filament.nodes - 1)
+    s = np.linspace(0.0, filament.length, filament.nodes)
+
+    def square(modulus, size: float) -> float:
+        return energy * size / float(np.min(modulus.bind("s", "t")(s, 0.0)))
+
+    stretched = square(filament.stretching, 1 / ds)
+    if stretched > FLUCTUATION:
+        out.append(
+            f"{key}.stretching: segments fluctuate by {np.sqrt(stretched):.2g} of their length (rms): "
+            "take a larger one, or fewer nodes"
+        )
+    turned = {"bending": max(square(modulus, ds) for modulus in filament.bending)}
+    if filament.twisting is not None:
+        turned["twisting"] = square(filament.twisting, ds)
+    for kind, value in turned.items():
+        if value > FLUCTUATION:
+            enough = 1 + int(np.ceil((filament.nodes - 1) * value / FLUCTUATION))
+            out.append(
+                f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: "
+                f"{value / FLUCTUATION:.2g} times that modulus, or {enough} nodes"
+                + (
+                    "; as it is, some are soon a quarter turn apart, which stops the run"
+                    if value > QUARTER_TURNS
+                    else ""
+                )
+            )
+    return out
+
+
+def _of_noisy_step(simulation: Simulation) -> list[str]:
+    case, dt = simulation.case, simulation.step_length
+    out: list[str] = []
+    assert case.thermal is not None
+    stretch = simulation.thermal_stretch(dt)
+    if stretch > THERMAL_STRETCH:
+        out.append(
+            f"time.step: thermal kicks turn segments so far in a step that they stay {100 * stretch:.2g} % longer; "
+            "take a shorter one"
+        )
+    memory = dt**2 / (2 * simulation.explicit_limit())
+    if memory > max(0.1 * case.time.end, dt):
+        out.append(
+            f"time.step: with it the stiffest motions reach their thermal spread only in {memory:.2g}; "
+            "take a shorter one, or start from a shape that has it"
+        )
+    if case.thermal.planar and np.max(np.abs(simulation.start.e3[:, 2])) > 1e-9:
+        out.append('thermal.directions: "xy" is meant for rods in a plane z = const, and these leave it')
+    return out
+
+
+def _of_run(simulation: Simulation) -> list[str]:
+    case, out = simulation.case, _of_noise(simulation)
+    if case.time.explicit and not case.time.automatic:
+        limit = simulation.explicit_limit()
+        if float(case.time.step) > limit:
+            out.append(f"time.step: {case.time.step:g} is above the explicit limit {limit:.3g}: this will diverge")
+    every = case.output.every
+    if every is not None and every > case.time.end:
+        out.append(
+            f"output.every: {every:g} is beyond time.end = {case.time.end:g}: only the start and the end are written"
+        )
+    touching = simulation.rods.contact.diagnostics(simulation.shape.r).get("contacts", 0.0)
+    if touching:
+        out.append(f"contact: {touching:.0f} pairs of segments touch at the start")
+    return out

@@ -1,0 +1,23 @@
+"""`ibfil check`: what a scene is, costs and may mean, without a run."""
+
+from __future__ import annotations
+
+import argparse
+
+from .arguments import DONE, add_case, read_case
+
+NAME, HELP = "check", "run nothing: what is modelled, sizes, stable steps, estimated time, warnings"
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """Add its arguments."""
+    add_case(command)
+
+
+def do(arguments: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    case = read_case(arguments.words)
+    from ..check.report import report
+
+    print(report(case))
+    return DONE

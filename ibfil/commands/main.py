@@ -1,0 +1,107 @@
+"""The command ``ibfil``: words to calls, faults to lines and an exit status.
+
+A command is a module with its ``NAME``, its ``HELP``, what it adds to its parser and what it does; COMMANDS lists them.
+Only the standard library is imported when they are, so that help is instant and the number of threads can be set before
+numpy is loaded; each imports what it needs when it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import CaseError, Interrupted, RunFailed
+from ..version import __version__
+from . import bench, cases, check, new, render, run, schema, show, verify, vtk
+from .arguments import BAD_INPUT, CUT, FAILED
+from .studies import compare, stability, sweep, trade
+
+COMMANDS = (run, check, new, cases, schema, show, vtk, render, sweep, trade, compare, stability, verify, bench)
+NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line ``argv`` (default: the program's own); returns the exit status."""
+    arguments = parse(list(sys.argv[1:] if argv is None else argv))
+    try:
+        status: int = arguments.do(arguments)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        _let_go()
+        return FAILED
+    except CaseError as error:
+        return _say(error.faults, BAD_INPUT)
+    except RunFailed as error:
+        return _say(str(error).splitlines(), FAILED)
+    except (Interrupted, KeyboardInterrupt) as error:
+        try:
+            sys.stdout.flush()
+        except BrokenPipeError:
+            _let_go()
+        return _say(str(error).splitlines() or ["interrupted"], CUT)
+    except OSError as error:
+        faults = [] if error.errno is not None else _damages(arguments)  # HDF5 gives no number
+        if faults:
+            return _say(faults, BAD_INPUT)
+        where = f"{error.filename}: " if error.filename else ""
+        return _say([f"{where}{error.strerror or error}"], FAILED if error.errno in NO_ROOM else BAD_INPUT)
+    except Exception:
+        faults = _damages(arguments)
+        if not faults:
+            raise
+        return _say(faults, BAD_INPUT)
+
+
+def parse(argv: list[str]) -> argparse.Namespace:
+    """Parse; words after an option (`run CASE -o OUT KEY=VALUE`) belong to the command's words too."""
+    parser = _parser()
+    arguments, rest = parser.parse_known_args(argv)
+    unknown = [word for word in rest if word.startswith("-") or not hasattr(arguments, "words")]
+    if unknown:
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    if rest:
+        arguments.words = [*arguments.words, *rest]
+    return arguments
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="ibfil",
+        description="Elastic filaments in viscous fluids: bending, twisting rods in resistive-force theory "
+        "or in an immersed-boundary grid fluid. A case is one TOML file, a run one HDF5 file.",
+        epilog="Exit status: 0 done, 1 the run failed, 2 bad input, 130 after Ctrl-C.",
+    )
+    parser.add_argument("--version", action="version", version=f"ibfil {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    for module in COMMANDS:
+        command = commands.add_parser(module.NAME, help=module.HELP, description=module.HELP, epilog=None)
+        command.set_defaults(do=module.do)
+        module.add(command)
+    return parser
+
+
+def _damages(arguments: argparse.Namespace) -> list[str]:
+    """What is wrong with the run file a command has read; where nothing is, an error is the program's own fault."""
+    path = getattr(arguments, "run", None) or getattr(arguments, "resume", None)
+    if path is None:
+        return []
+    from ..io.integrity import examine
+
+    return examine(Path(path))
+
+
+def _let_go() -> None:
+    """The reader (`| head`) has gone: what Python still holds for it must not raise again at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _say(faults: Sequence[str], status: int) -> int:
+    """Faults to standard error, one line each."""
+    for fault in faults:
+        print(f"ibfil: {fault}", file=sys.stderr)
+    return status

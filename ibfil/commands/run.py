@@ -1,0 +1,86 @@
+"""`ibfil run`: a case from its start, or on from a checkpoint."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import CaseError
+from ..threads import set_threads
+from .arguments import DONE, add_case, log, only_changes, read_case, say_if_cold
+
+if TYPE_CHECKING:
+    from ..running.loop import Result
+
+NAME, HELP = "run", "run a case: a file, or the name of a shipped case"
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """Add its arguments."""
+    add_case(command, "*")
+    command.add_argument("-o", dest="output", metavar="RUN.h5", help="the run file (default: the case's name, here)")
+    command.add_argument("--force", action="store_true", help="replace a run file that is there already")
+    command.add_argument("--resume", metavar="RUN.h5", help="go on from the last checkpoint of this run")
+
+
+def do(arguments: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    words = arguments.words
+    if arguments.resume:
+        return _resume(arguments)
+    if not words:
+        raise CaseError(["run: found no case; allowed: CASE [KEY=VALUE ...], or --resume RUN.h5"])
+    case = read_case(words)
+    output = Path(arguments.output or Path(words[0]).with_suffix(".h5").name)
+    if not output.parent.is_dir():
+        raise CaseError([f"{output}: there is no folder {output.parent}"])
+    say_if_cold()
+    from ..running.run import run
+
+    changes = " ".join(word for word in words[1:] if not word.startswith(("output.", "compute.")))
+    return _end(run(case, output, overwrite=arguments.force, log=log), changes)
+
+
+def _resume(arguments: argparse.Namespace) -> int:
+    """Go on with a run; its number of threads is needed before the libraries that can read it are loaded."""
+    if arguments.output or arguments.force:
+        raise CaseError(["run --resume: found -o or --force; allowed: neither, it goes on in the same file"])
+    words = arguments.words
+    with_case = bool(words) and ("=" not in words[0] or Path(words[0]).is_file())
+    case = read_case(words) if with_case else None
+    if case is None:
+        only_changes(words)
+        set_threads(_threads_of(arguments.resume))
+    say_if_cold()
+    from ..running.run import resume_run
+
+    return _end(resume_run(arguments.resume, case, () if with_case else words, log=log))
+
+
+def _threads_of(run: str) -> int:
+    """The threads of a run's case, read by another process; 1 where it cannot be read, to fail later."""
+    code = (
+        "import sys, pathlib; from ibfil.case.reading import parse_case; from ibfil.io import checkpoint, reader; "
+        "c = checkpoint.read(reader.checkpoint_path(pathlib.Path(sys.argv[1]))); "
+        "print(parse_case(c.case, c.file).compute.threads)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code, run], capture_output=True, text=True, check=False)
+    return int(answer.stdout) if answer.returncode == 0 else 1
+
+
+def _end(result: Result, changes: str = "") -> int:
+    """What a run ends with: the file, how it ended, the observables, and what was expected before ``changes``."""
+    from ..analysis.summary import digest, duration, results
+    from ..io.reader import RunFile
+
+    assert result.path is not None
+    with RunFile(result.path) as run:
+        told = digest(run)
+    reason = f" ({told['reason']})" if told["reason"] else ""
+    print(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
+    print(f"{result.path}: {told['outputs']} outputs")
+    print(results(told, changes))
+    return DONE

@@ -1,0 +1,1 @@
+"""The commands of the studies: many runs of one scene."""

@@ -1,0 +1,70 @@
+"""`ibfil compare`: one scene under several fluids."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..arguments import log, positive
+from .arguments import add_study, begin
+
+NAME, HELP = "compare", "one scene under several fluids: table, CSV and a figure"
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """Add its arguments."""
+    add_study(command, "compare")
+    command.add_argument(
+        "--fluids",
+        metavar="rft,stokes,...",
+        default="rft,matched,stokes",
+        help="rft, matched (drag of the grid), slender, stokes, navier-stokes (default: %(default)s)",
+    )
+    command.add_argument("--period", type=positive, metavar="T", help="of the motion (default: of what drives it)")
+    command.add_argument("--transient", type=positive, metavar="T", help="left out at the start (default: a third)")
+
+
+def do(arguments: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    case, changes, folder = begin(arguments, "compare")
+    from ...studies.compare import study
+
+    made = study.compare(
+        case,
+        arguments.fluids.split(","),
+        folder,
+        changes,
+        period=arguments.period,
+        transient=arguments.transient,
+        jobs=arguments.jobs,
+        say=log,
+    )
+    _print_comparison(made)
+    print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
+    return 0 if all(column.outcome.done for column in made.columns) else 1
+
+
+def _print_comparison(made: Any) -> None:
+    """The table for the eye, and what each fluid models that not all do."""
+    from ...analysis.summary import table
+
+    def cell(found: Any) -> str:
+        if found is None:
+            return "-"
+        return f"{found.value:.4g}" + ("" if found.error is None else f" +- {found.error:.1g}")
+
+    names = list(dict.fromkeys(key for column in made.columns for key in column.numbers))
+    lines = [["", *(column.fluid for column in made.columns)]]
+    lines += [[name, *(cell(column.numbers.get(name)) for column in made.columns)] for name in names]
+    print("\n".join(table(lines)))
+    window = made.window
+    print(
+        f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}; "
+        "+- their standard error, from the scatter between these, not that of steps, nodes or cells"
+    )
+    for column in made.columns:
+        for line in column.own or (column.outcome.message or "nothing that the others do not model",):
+            print(f"  {column.fluid}: {line}")
+    for column in made.columns:
+        for line in column.shares:
+            print(f"  {column.fluid}: {line}")

@@ -1,0 +1,33 @@
+"""`ibfil stability`: which settings are stable and right."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..arguments import log
+from .arguments import add_study, add_vary, axes, begin, print_table
+
+NAME, HELP = "stability", "which settings are stable and right: a map, with the predicted limit"
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """Add its arguments."""
+    add_study(command, "stability")
+    add_vary(command)
+
+
+def do(arguments: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    case, changes, folder = begin(arguments, "stability")
+    varied = axes(arguments.vary)
+    from ...studies.stability import study
+
+    made = study.stability(case, varied, folder, changes, jobs=arguments.jobs, say=log)
+    print_table(study.rows(made), ("message",))
+    print(
+        "against a finer run, the largest over outputs: place and shape (without rigid motion), rms of nodes/L; "
+        "turn, rad; stretch; force, ratio"
+    )
+    print(f"{made.foretold} of {len(made.cells)} as predicted")
+    print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
+    return 0

@@ -1,0 +1,77 @@
+"""`ibfil trade`: error against the time it takes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from ..arguments import count, duration, log, positive
+from .arguments import add_study, add_vary, axes, begin, print_table
+
+if TYPE_CHECKING:
+    from ...studies.trade.results import Trade
+
+NAME, HELP = "trade", "error against wall time over settings, with a proved reference and the Pareto front"
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """Add its arguments."""
+    add_study(command, "trade")
+    add_vary(command)
+    command.add_argument("--observe", metavar="NAME,...", help="errors of what: position, observables (default: all)")
+    command.add_argument("--repeat", type=count, default=3, metavar="N", help="runs of each setting, for the noise")
+    command.add_argument(
+        "--clock",
+        choices=("wall", "processor"),
+        default="wall",
+        help="whose seconds count; on a busy machine: processor",
+    )
+    command.add_argument("--budget", type=duration, metavar="10m", help="stop after this time: 90s, 10m, 2h")
+    command.add_argument(
+        "--for", dest="wanted", type=positive, metavar="1e-3", help="end with the cheapest for this error"
+    )
+
+
+def do(arguments: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    case, changes, folder = begin(arguments, "trade")
+    varied = axes(arguments.vary)
+    from ...studies.trade import study
+
+    made = study.trade(
+        case,
+        varied,
+        folder,
+        changes,
+        observe=arguments.observe.split(",") if arguments.observe else (),
+        repeat=arguments.repeat,
+        clock=arguments.clock,
+        budget=arguments.budget,
+        jobs=arguments.jobs,
+        say=log,
+    )
+    print_table(study.rows(made), ("message",))
+    print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
+    if arguments.wanted is None:
+        return 0
+    best = made.cheapest(arguments.wanted)
+    if best is None:
+        return _none_within(made, arguments.wanted)
+    print(f"the cheapest within {arguments.wanted:g}:")
+    print(*best.setting.overrides)
+    return 0
+
+
+def _none_within(made: Trade, wanted: float) -> int:
+    """Say how near the settings came."""
+    told = f"ibfil: no setting comes within {wanted:g} in {', '.join(made.measures)}"
+    done = [one for one in made.tried if one.errors]
+    if done:
+        best = min(done, key=lambda one: max(made.error(one, measure) for measure in made.measures))
+        worst = max(made.measures, key=lambda measure: made.error(best, measure))
+        named = " ".join(best.setting.overrides)
+        told += f"; the nearest, {named}, is {made.error(best, worst):.2g} off in {worst}, with the reference's own"
+    print(told, file=sys.stderr)
+    print("ibfil: what to change: vary other keys, or shorter steps", file=sys.stderr)
+    return 1

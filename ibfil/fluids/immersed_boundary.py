@@ -1,0 +1,149 @@
+"""What all immersed-boundary fluids share: the implicit statement on a grid's mobility, whatever evaluates it.
+
+    u = u0 + (J L^-1 S + s) F          (Eq. 45 of the paper, with +f)
+
+S spreads nodal forces with a discrete delta kernel, L^-1 is the fluid's solve, J interpolates back (S transposed, times
+the cell's volume), s is the slip mobility that keeps nearly inextensible rods from locking when their nodes are closer
+than the grid (numerics.md, 4.3). What of a node goes through the fluid is told by its coupling: forces and velocities
+(mobility_table.py), or torques and spins with them (torque_coupling.py). Reactions of supports are spread like any
+force.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..grid.kernels import Kernel
+from ..grid.periodic_grid import Grid
+from ..linalg import banded
+from ..linalg.constraints import Held
+from .base import Answer, Flow
+from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
+from .coupling import TRANSLATION, Coupling, Nodes
+
+
+@dataclass(frozen=True)
+class Immersed:
+    """What every grid fluid is made of: grid, kernel, eta, slip (n,), drag against spin (n,) or None, background flow.
+
+    The drag is that of rods whose turns do not go through the grid; None where nothing twists or all goes through it.
+    ``rods`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is
+    the type of the mobility table's numbers and of the fields of a fluid with inertia, double or single precision
+    (relative error about 1e-7).
+    """
+
+    grid: Grid
+    kernel: Kernel
+    viscosity: float
+    slip: np.ndarray
+    spin_drag: np.ndarray | None
+    flow: Flow | None = None
+    rods: tuple[slice, ...] = ()
+    number: type = np.float64
+    coupling: Coupling = TRANSLATION
+
+    @cached_property
+    def condensation(self) -> Condensation:
+        """Which unknowns go through the grid, and what the others do."""
+        return NothingCondensed() if self.spin_drag is None else TwistCondensed(self.spin_drag)
+
+    @cached_property
+    def own(self) -> np.ndarray:
+        """What each node moves by itself (n, c), beyond the grid's answer."""
+        return self.coupling.own(self.slip)
+
+    def stencil(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First grid index (n, 3) and weights (n, 3, P) of the nodes r (n, 3)."""
+        return self.kernel.stencil(self.grid.coordinates(r))
+
+    def nodes(self, r: np.ndarray, e3: np.ndarray) -> Nodes:
+        """The nodes r (n, 3) with tangents e3 (n, 3) on the grid."""
+        return Nodes(*self.stencil(r), self.coupling.axes(e3))
+
+    def carried(self, nodes: Nodes, r: np.ndarray, time: float) -> np.ndarray | None:
+        """The motions (n, c) with which the background flow carries nodes at r (n, 3); None where there is none."""
+        if self.flow is None:
+            return None
+        return self.coupling.carried(self.flow, r, nodes.axes, time, self.grid.spacing)
+
+
+def slip_mobility(fraction: float, kernel: Kernel, grid: Grid, viscosity: float, volume: np.ndarray) -> np.ndarray:
+    """s = eps (h / 2 Lc)/(6 pi eta a), a the kernel's point radius, Lc (n,) the nodes' control volumes.
+
+    The same slip per length of rod everywhere: an end's node, of half a volume, slips by twice as much under a force.
+    With the spacing in place of Lc the ends would be off, and the whole only of first order in the spacing.
+    """
+    h = grid.spacing
+    return fraction * (h / (2 * volume)) / (6 * np.pi * viscosity * kernel.point_radius * h)
+
+
+class ImmersedResponse(ABC):
+    """Positions frozen over a step of effective length tau. What evaluates the mobility is a subclass's.
+
+    c numbers of a node go through the grid.
+    """
+
+    keeps = False
+
+    def __init__(self, immersed: Immersed, nodes: Nodes, flow: np.ndarray | None, tau: float) -> None:
+        """``flow`` (n, c) are the motions that nodes have without any force, None where they have none."""
+        self.immersed, self.nodes, self.flow, self.tau = immersed, nodes, flow, tau
+        self.parts = immersed.coupling.parts
+
+    @abstractmethod
+    def apply(self, force: np.ndarray) -> np.ndarray:
+        """Velocities (c n,) of forces (c n,), without the background flow."""
+
+    @abstractmethod
+    def columns(self, index: np.ndarray) -> np.ndarray:
+        """Columns (c n, k) of the mobility at flat indices (k,)."""
+
+    @abstractmethod
+    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+        """x (c n,) with (1 - tau M K) x = right; at held unknowns columns of -tau M: forces are sought."""
+
+    def _base(self, target: np.ndarray) -> np.ndarray:
+        base = target[:, : self.parts]
+        return base.ravel() if self.flow is None else (base + self.tau * self.flow).ravel()
+
+    def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
+        """y = target + tau (u0 + M (force + R)), R such that held unknowns move as prescribed."""
+        condensation, (n, m), c = self.immersed.condensation, force.shape, self.parts
+        reaction = np.zeros((n, m))
+        move = self._base(target) + self.tau * self.apply(np.ascontiguousarray(force[:, :c]).ravel())
+        here, index = condensation.held_in_fluid(held, m)
+        if index.size:
+            columns = self.columns(index)
+            push = np.linalg.solve(self.tau * columns[index], held.value[here] - move[index])
+            move = move + self.tau * columns @ push
+            reaction[index // c, index % c] = push
+        y = np.zeros((n, m))
+        y[:, :c] = move.reshape(n, c)
+        condensation.move_rest(y, force, target, self.tau)
+        y.ravel()[held.at] = held.value
+        reaction += condensation.react_rest(y, target, force, held, self.tau)
+        return Answer(y, force + reaction, reaction)
+
+    def implicit(
+        self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
+    ) -> Answer:
+        """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
+        condensation, c = self.immersed.condensation, self.parts
+        statement = condensation.reduced(Newton(force, stiffness, held, y, target, self.tau))
+        index = statement.index
+        known = np.zeros(statement.force.size)
+        known[index] = statement.value
+        push = statement.force + statement.times(known) if index.size else statement.force
+        right = self._base(target) - y[:, :c].ravel() + self.tau * self.apply(push) - known
+        x = self.solve(statement, right)
+        d, reaction = x.copy(), np.zeros(force.shape)
+        d[index] = statement.value
+        reaction[index // c, index % c] = x[index]
+        move = statement.whole(d)
+        felt = force + banded.multiply(stiffness, move)
+        reaction += condensation.react_rest(y + move, target, felt, held, self.tau)
+        return Answer(move, felt + reaction, reaction)

@@ -1,0 +1,184 @@
+"""The exact mobility of nodes on the grid, without the grid (ib_numerics.md, section 1).
+
+Weights of a node are products over the axes, so the velocity that a unit force at node q gives node p is
+
+    M_pq = sum_m c_x[m_x] c_y[m_y] c_z[m_z] G(b_p - b_q + m),    c[m] = sum_{i - j = m} w_p[i] w_q[j]
+
+with G the grid's response to a unit force on one cell. It is the operator J L^-1 S itself, to round-off, and its cost
+does not depend on the number of cells. G is even or odd along each axis, so one octant is stored, with a rim as wide
+as a kernel: a pair is mirrored into the octant instead of each of its terms.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+from scipy.fft import irfftn
+
+from ..grid.periodic_grid import Grid
+from ..linalg.vectors import NOT_NEGATIVE
+
+if TYPE_CHECKING:
+    pass
+
+
+_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_SIX = (0,) * 6
+
+
+def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
+    """G (6, nx, ny, nz): velocity from a unit force on cell 0, components xx, yy, zz, xy, xz, yz.
+
+    Unit force: density 1/h^3 on that cell. ``alpha`` (density over time) is zero in Stokes flow.
+    """
+    (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
+    k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
+    total = alpha + viscosity * (sx[:, None, None] + sy[None, :, None] + sz[None, None, :])
+    total[0, 0, 0] = np.inf
+    square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
+    square[square == 0] = np.inf
+    out = np.empty((6, *grid.cells))
+    for c, (a, b) in enumerate(_COMPONENTS):
+        symbol = (float(a == b) - k[a] * k[b] / square) / (total * grid.spacing**3)
+        out[c] = irfftn(symbol, s=tuple(grid.cells), axes=(0, 1, 2))
+    return out
+
+
+def octant(response: np.ndarray, points: int) -> np.ndarray:
+    """The octant of G that every pair can be mirrored into, with a rim of points - 1 cells: (x, y, z and part)."""
+    rim = points - 1
+    axes = [np.arange(-rim, n // 2 + rim + 1) % n for n in response.shape[1:]]
+    cut = response[:, axes[0][:, None, None], axes[1][None, :, None], axes[2][None, None, :]]
+    table = np.ascontiguousarray(np.moveaxis(cut, 0, 3))
+    return table.reshape(*table.shape[:2], -1)
+
+
+@njit(cache=True, inline="always")
+def _plane_sums(table, corner, c, acc, unit, points):
+    """The sums over x and y into ``acc`` (k terms,).
+
+    Written so that the compiler takes neighbours in ``acc`` together. Up to four points it unrolls both sums, and keeps
+    each in a register until it is whole; beyond, only that over x.
+    """
+    p = len(points)
+    terms, length = 2 * p - 1, len(unit) * (2 * p - 1)
+    at_x, at_y, at_z = corner
+    if p <= 4:
+        for k in range(length):
+            plane = 0.0
+            for j in range(2 * p - 1):
+                line = 0.0
+                for i in range(2 * p - 1):
+                    line += c[0, i] * table[at_x + i, at_y + j, at_z + k]
+                plane += c[1, j] * line
+            acc[k] = plane
+    else:
+        for k in range(length):
+            acc[k] = 0.0
+        for j in range(terms):
+            for k in range(length):
+                line = 0.0
+                for i in range(2 * p - 1):
+                    line += c[0, i] * table[at_x + i, at_y + j, at_z + k]
+                acc[k] += c[1, j] * line
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit, points):
+    """All components of the table for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
+
+    ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` and ``points`` tuples of k and of P
+    entries: what the compiler knows of k and P. Returns the signs (3,) of the mirrored axes, for components beyond the
+    sixth. Arrays are indexed in full in every loop: a view of one costs more than the arithmetic.
+    """
+    p, parts = len(points), len(unit)
+    corner = (0, 0, 0)
+    sign = (1.0, 1.0, 1.0)
+    for axis in range(3):
+        n = cells[axis]
+        d = (base[a, axis] - base[b, axis]) % n
+        mirrored = d > n // 2
+        u, v = (b, a) if mirrored else (a, b)  # seen from the other node the axis points the other way
+        for m in range(2 * p - 1):
+            c[axis, m] = 0.0
+        for i in range(len(points)):
+            for j in range(len(points)):
+                c[axis, i - j + p - 1] += weights[u, axis, i] * weights[v, axis, j]
+        at, s = (n - d, -1.0) if mirrored else (d, 1.0)
+        at &= NOT_NEGATIVE
+        if axis == 0:
+            corner, sign = (at, 0, 0), (s, 1.0, 1.0)
+        elif axis == 1:
+            corner, sign = (corner[0], at, 0), (sign[0], s, 1.0)
+        else:
+            corner, sign = (corner[0], corner[1], parts * at), (sign[0], sign[1], s)
+    _plane_sums(table, corner, c, acc, unit, points)
+    for x in range(parts):
+        total = 0.0
+        for k in range(2 * p - 1):
+            total += c[2, k] * acc[parts * k + x]
+        sums[x] = total
+    sums[3] *= sign[0] * sign[1]
+    sums[4] *= sign[0] * sign[2]
+    sums[5] *= sign[1] * sign[2]
+    return sign
+
+
+@njit(cache=True)
+def _pairs(table, cells, base, weights, slip, rows, columns, points):
+    terms = 2 * len(points) - 1
+    c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
+    out = np.empty((rows.size, 3, columns.size, 3))
+    for i in range(rows.size):
+        for j in range(columns.size):
+            a, b = rows[i], columns[j]
+            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX, points)
+            for x in range(3):
+                out[i, x, j, x] = sums[x] + (slip[a] if a == b else 0.0)
+            out[i, 0, j, 1] = out[i, 1, j, 0] = sums[3]
+            out[i, 0, j, 2] = out[i, 2, j, 0] = sums[4]
+            out[i, 1, j, 2] = out[i, 2, j, 1] = sums[5]
+    return out
+
+
+@njit(cache=True)
+def _mobility(table, cells, base, weights, slip, points):
+    n, terms = weights.shape[0], 2 * len(points) - 1
+    c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
+    out = np.empty((n, 3, n, 3))
+    for a in range(n):
+        for b in range(a, n):
+            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX, points)
+            for x in range(3):
+                out[a, x, b, x] = out[b, x, a, x] = sums[x]
+            out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = sums[3]
+            out[a, 0, b, 2] = out[b, 0, a, 2] = out[a, 2, b, 0] = out[b, 2, a, 0] = sums[4]
+            out[a, 1, b, 2] = out[b, 1, a, 2] = out[a, 2, b, 1] = out[b, 2, a, 1] = sums[5]
+        for x in range(3):
+            out[a, x, a, x] += slip[a]
+    return out
+
+
+def pairs(
+    table: np.ndarray,
+    cells: np.ndarray,
+    base: np.ndarray,
+    weights: np.ndarray,
+    slip: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+) -> np.ndarray:
+    """The mobility (len(rows), 3, len(columns), 3) between nodes, with slip[i] added on the diagonal of node i.
+
+    ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils, ``table`` the octant.
+    """
+    return _pairs(table, cells, base, weights, slip, rows, columns, (0,) * weights.shape[2])
+
+
+def mobility(
+    table: np.ndarray, cells: np.ndarray, base: np.ndarray, weights: np.ndarray, slip: np.ndarray
+) -> np.ndarray:
+    """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
+    return _mobility(table, cells, base, weights, slip, (0,) * weights.shape[2])

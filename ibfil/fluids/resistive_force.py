@@ -1,0 +1,172 @@
+"""Resistive-force theory: a drag on every node, and nothing between nodes (Sec. 2 and Eq. 16-17 of the paper).
+
+    Z_i = Lc [ zeta_perp (1 - e3 e3) + zeta_par e3 e3 ],   and Lc zeta_r for the spin:   Z (u - u0) = F
+
+M = Z^-1, so the implicit step is multiplied by Z and stays banded: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..linalg import banded
+from ..linalg.constraints import Held
+from ..linalg.vectors import at, dot, mix, put
+from .base import Answer, Flow, Memoryless
+
+
+class Drag(NamedTuple):
+    """Drag of each node's control volume (n,): across, along the tangent, and against spin (zero: no twist)."""
+
+    perp: np.ndarray
+    par: np.ndarray
+    spin: np.ndarray
+
+
+@njit(cache=True)
+def resist(drag: Drag, e3, u):
+    """Z u for u (n, m)."""
+    n, m = u.shape
+    out = np.empty((n, m))
+    for i in range(n):
+        t, v = at(e3, i, 0), at(u, i, 0)
+        put(out, i, 0, mix(drag.perp[i], v, (drag.par[i] - drag.perp[i]) * dot(v, t), t))
+        if m == 4:
+            out[i, 3] = drag.spin[i] * u[i, 3]
+    return out
+
+
+@njit(cache=True)
+def mobilize(drag: Drag, e3, force):
+    """Z^-1 F for F (n, m)."""
+    n, m = force.shape
+    out = np.empty((n, m))
+    for i in range(n):
+        t, f = at(e3, i, 0), at(force, i, 0)
+        put(out, i, 0, mix(1.0 / drag.perp[i], f, (1.0 / drag.par[i] - 1.0 / drag.perp[i]) * dot(f, t), t))
+        if m == 4:
+            out[i, 3] = force[i, 3] / drag.spin[i]
+    return out
+
+
+@njit(cache=True)
+def _system(stiffness, drag: Drag, e3, moved, force, inverse):
+    """Turns K into K - Z/tau in place, and returns the right side Z moved/tau - f (n, m)."""
+    n, m, width = stiffness.shape
+    here = (width - m) // 2
+    right = resist(drag, e3, moved)
+    for i in range(n):
+        t, along = at(e3, i, 0), (drag.par[i] - drag.perp[i]) * inverse
+        for a in range(m):
+            right[i, a] = inverse * right[i, a] - force[i, a]
+        for a in range(3):
+            for b in range(3):
+                stiffness[i, a, here + b] -= along * t[a] * t[b]
+            stiffness[i, a, here + a] -= drag.perp[i] * inverse
+        if m == 4:
+            stiffness[i, 3, here + 3] -= drag.spin[i] * inverse
+    return right
+
+
+@njit(cache=True)
+def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, profile, unit):
+    """Solves (K - Z/tau) d = Z moved/tau - f with d = value (k,) at the held unknowns (k,).
+
+    Returns d, the force felt Z (moved + d)/tau, and whether elimination without pivoting went well; if not, d is of no
+    use. ``stiffness`` is used up, ``unit`` a tuple of m entries.
+    """
+    m, width = stiffness.shape[1:]
+    d = _system(stiffness, drag, e3, moved, force, inverse)
+    for k in range(held.size):
+        i, a = held[k] // m, held[k] % m
+        stiffness[i, a, :] = 0.0
+        stiffness[i, a, (width - m) // 2 + a] = 1.0
+        d[i, a] = value[k]
+    good = banded.eliminate(stiffness, d, profile.first, profile.last, unit)
+    return d, resist(drag, e3, (moved + d) * inverse), good
+
+
+class _Response:
+    keeps = False
+
+    def __init__(
+        self, drag: Drag, profile: banded.Profile, e3: np.ndarray, flow: np.ndarray | None, tau: float
+    ) -> None:
+        self.drag, self.profile, self.e3, self.flow, self.tau = drag, profile, e3, flow, tau
+
+    def _velocity_target(self, target: np.ndarray) -> np.ndarray:
+        if self.flow is None:
+            return target
+        base = target.copy()
+        base[:, :3] += self.tau * self.flow
+        return base
+
+    def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
+        base = self._velocity_target(target)
+        y = base + self.tau * mobilize(self.drag, self.e3, force)
+        y.ravel()[held.at] = held.value
+        felt = resist(self.drag, self.e3, (y - base) / self.tau)
+        return Answer(y, felt, _at(held, felt - force))
+
+    def implicit(
+        self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
+    ) -> Answer:
+        """(K - Z/tau) d = Z/tau (y - target) - Z u0 - f; uses ``stiffness`` up."""
+        base = self._velocity_target(target)
+        moved, m, inverse = y - base, force.shape[1], 1.0 / self.tau
+        nodes = np.unique(held.at // m) if held.at.size else held.at
+        rows = stiffness[nodes] if nodes.size else stiffness[:0]
+        value = held.value - y.ravel()[held.at] if nodes.size else held.value
+        d, felt, good = _correct(
+            *(stiffness, self.drag, self.e3, moved, force, inverse, held.at, value, self.profile, (0,) * m)
+        )
+        if not good:
+            right = inverse * resist(self.drag, self.e3, moved) - force
+            right.ravel()[held.at] = value
+            d = banded.solve_pivoted(stiffness, right)
+            felt = resist(self.drag, self.e3, (moved + d) * inverse)
+        if not nodes.size:
+            return Answer(d, felt, np.zeros(d.shape))
+        rest = felt - force
+        rest[nodes] -= _rows_times(rows, nodes, d)
+        return Answer(d, felt, _at(held, rest))
+
+
+def _at(held: Held, values: np.ndarray) -> np.ndarray:
+    """``values`` at the held unknowns, zero elsewhere."""
+    out = np.zeros_like(values)
+    out.ravel()[held.at] = values.ravel()[held.at]
+    return out
+
+
+def _rows_times(rows: np.ndarray, nodes: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """(K d) at a few nodes (k, m), from their rows of the band matrix."""
+    n, m = d.shape
+    w = (rows.shape[2] // m - 1) // 2
+    padded = np.zeros((n + 2 * w, m))
+    padded[w : n + w] = d
+    return np.stack([row @ padded[i : i + 2 * w + 1].ravel() for row, i in zip(rows, nodes, strict=True)])
+
+
+class ResistiveForce(Memoryless):
+    """The RFT fluid.
+
+    ``drag`` holds the coefficients times the control volumes, ``profile`` where the rods' matrices are not zero;
+    ``flow(r, t)`` the background velocity (n, 3) at the nodes, or None (Eq. 48).
+    """
+
+    def __init__(self, drag: Drag, profile: banded.Profile, flow: Flow | None = None) -> None:
+        self.drag, self.profile, self.flow = drag, profile, flow
+
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Response:
+        """Drag of each node about the tangents e3, in the background flow of ``time``."""
+        return _Response(self.drag, self.profile, e3, None if self.flow is None else self.flow(r, time), tau)
+
+    def velocity_at(
+        self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
+    ) -> np.ndarray:
+        """The background velocity (k, 3): in this theory nodes do not move the fluid elsewhere."""
+        return np.zeros_like(points) if self.flow is None else self.flow(points, time)

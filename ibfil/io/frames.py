@@ -1,0 +1,42 @@
+"""What one output holds. simulation/diagnostics.py makes frames; run files, observables and pictures read them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+@dataclass(frozen=True)
+class FilamentFrame:
+    """One filament of N nodes at one time, in the case's units; lab frame unless said otherwise."""
+
+    position: np.ndarray  # (N, 3), unwrapped
+    velocity: np.ndarray  # (N, 3)
+    force: np.ndarray  # (N, 3) on the fluid, per node, reactions included
+    e1: np.ndarray  # (N, 3) first material director
+    moment: np.ndarray  # (N, 3) components along e1, e2, e3
+    strain: np.ndarray  # (N, 3) Omega_1, Omega_2, Omega_3
+    tension: np.ndarray  # (N - 1,) EA (|d|/ds - 1), positive when stretched
+    reaction_start: np.ndarray | None  # (3,) force of the support on the node at s = 0, where it is held
+    reaction_finish: np.ndarray | None  # (3,) the same at s = L
+    torque: np.ndarray | None = None  # (N, 3) twist torque on the fluid, per node; None where it does not twist
+    spin: np.ndarray | None = None  # (N, 3) rate at which e1 turns about the tangent, along it; likewise
+
+    @property
+    def power(self) -> np.ndarray:
+        """Power (N,) of each node on the fluid: of its force, and of its twist torque."""
+        power: np.ndarray = (self.force * self.velocity).sum(axis=1)
+        return power if self.torque is None or self.spin is None else power + (self.torque * self.spin).sum(axis=1)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """All filaments at one time, with the diagnostics taken at outputs and the fields where they were asked for."""
+
+    time: float
+    filaments: dict[str, FilamentFrame]
+    diagnostics: dict[str, float | np.ndarray]
+    grid: dict[str, np.ndarray] | None = None

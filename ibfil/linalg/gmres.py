@@ -1,0 +1,103 @@
+"""Implicit steps by GMRES on a product that costs FFTs, and the preconditioners they are given.
+
+The preconditioner P is the system rod by rod, factored. Residuals are measured after P, where they are errors of the
+solution in the unknowns' own units: before it, a stiff rod of many nodes turns rounding of the smallest moves into
+residuals above any useful tolerance (floor about 1e-11 for 200 nodes a tenth of a cell apart), and a residual of a
+millionth may hide a solution that is wrong throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse.linalg import LinearOperator, gmres
+
+_WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
+CYCLE = 60  # vectors GMRES keeps
+
+Product = Callable[[np.ndarray], np.ndarray]
+
+
+class Factors(NamedTuple):
+    """LU factors, with pivots, of a system."""
+
+    lu: np.ndarray
+    pivots: np.ndarray
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """x with system x = right."""
+        return dgetrs(self.lu, self.pivots, right)[0]
+
+
+def factor(transposed: np.ndarray) -> Factors:
+    """The factors of a system (n, n) from its transpose, which is overwritten: LAPACK takes rows for columns.
+
+    Raises numpy.linalg.LinAlgError where it is singular.
+    """
+    lu, pivots, fault = dgetrf(transposed.T, overwrite_a=True)
+    if fault:
+        raise np.linalg.LinAlgError("Singular matrix")
+    return Factors(lu, pivots)
+
+
+class Blocks(NamedTuple):
+    """A preconditioner: LU factors of the system's diagonal block for each range of unknowns, and their scale.
+
+    ``scale`` (n,) are the units that solutions are measured in: one for a move, and for the force that holds an
+    unknown the force that would move it by one.
+    """
+
+    factors: list[tuple[slice, Factors]]
+    scale: np.ndarray
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """The approximate x (n,)."""
+        out = np.empty_like(right)
+        for at, factors in self.factors:
+            out[at] = factors.solve(right[at])
+        return out
+
+
+def factored(parts: list[tuple[slice, np.ndarray]], held: np.ndarray) -> Blocks:
+    """The factors of square blocks, by the range of unknowns each stands for, given transposed; overwrites them."""
+    diagonal = np.concatenate([np.diag(system) for _, system in parts])
+    scale = np.ones(len(diagonal))
+    scale[held] = 1.0 / diagonal[held]
+    return Blocks([(at, factor(system)) for at, system in parts], scale)
+
+
+class Solution(NamedTuple):
+    """What GMRES found: x (n,), how many products it took, and whether x is within the tolerance."""
+
+    x: np.ndarray
+    products: int
+    found: bool
+
+
+def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float, most: int) -> Solution:
+    """x with product(x) = right to the relative error ``tolerance``, in some ``most`` products.
+
+    Where rounding does not let it come so far, 1e-6 will do.
+    """
+    count, errors = 0, [np.inf]
+
+    def measured(z: np.ndarray) -> np.ndarray:
+        nonlocal count
+        count += 1
+        return blocks.solve(product(blocks.scale * z)) / blocks.scale
+
+    z, failed = gmres(
+        LinearOperator((right.size, right.size), matvec=measured, dtype=float),
+        blocks.solve(right) / blocks.scale,
+        rtol=tolerance,
+        atol=0.0,
+        restart=min(most, CYCLE),
+        maxiter=-(-most // CYCLE),
+        callback=errors.append,
+        callback_type="pr_norm",
+    )
+    found = bool(np.isfinite(z).all()) and (not failed or errors[-1] < _WORST)
+    return Solution(blocks.scale * z, count, found)

@@ -1,0 +1,160 @@
+"""The numbers of a run: what observables, stop rules and expectations have in common.
+
+An observable gives one value at every output, its series, which the run file keeps, and one number at the
+end, its summary. The kinds a case may name are in local.py and fitted.py; from Python any object with
+the attributes of `Observable` may be added to a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+
+from ..io.frames import Frame
+from . import time_series
+
+if TYPE_CHECKING:
+    from ..case.schema import Case, Observe
+
+
+Value = float | np.ndarray
+
+
+class Observable(Protocol):
+    """One number, or vector (3,), at every output, and one of the whole run.
+
+    ``dimension`` and ``summary_dimension`` are as in io/units.py, ``description`` says what the series is.
+    ``sample`` is called once for each output in the order of time, from the first one on, also when a run
+    that was cut goes on.
+    """
+
+    @property
+    def dimension(self) -> str:
+        """Of the series."""
+        ...
+
+    @property
+    def summary_dimension(self) -> str:
+        """Of the summary."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """Of the series, in words."""
+        ...
+
+    def sample(self, frame: Frame) -> Value:
+        """Value at this output."""
+        ...
+
+    def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
+        """Value for the run, from its times (T,) and samples (T,) or (T, 3)."""
+        ...
+
+
+class Unfit(Exception):
+    """An observable's key that its kind does not have, or not so."""
+
+    def __init__(self, key: str, found: object, allowed: str) -> None:
+        super().__init__(f"{key}: found {_shown(found)}; allowed: {allowed}")
+
+
+def _shown(found: object) -> str:
+    if isinstance(found, Sequence) and not isinstance(found, str):
+        return "[" + ", ".join(f"{value:g}" for value in found) + "]"
+    return f'"{found}"' if isinstance(found, str) else str(found)
+
+
+class _Reduction(NamedTuple):
+    """One way to make a number of a series: what it is called before the series' name, and its function."""
+
+    words: str
+    of: Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]
+
+
+def _over(reduce: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]:
+    """A reduction of the samples between two times; no number where there are none."""
+
+    def of(times: np.ndarray, samples: np.ndarray, start: float, end: float) -> np.ndarray:
+        _, values = time_series.cut(times, samples, start, end)
+        return reduce(values) if len(values) else np.full(samples.shape[1:], np.nan)
+
+    return of
+
+
+_SUMMARIES = {
+    "last": _Reduction("", _over(lambda values: values[-1])),
+    "mean": _Reduction("mean over time of ", time_series.mean),
+    "median": _Reduction("median over time of ", _over(lambda values: np.median(values, axis=0))),
+    "max": _Reduction("max over time of ", _over(lambda values: values.max(axis=0))),
+    "min": _Reduction("min over time of ", _over(lambda values: values.min(axis=0))),
+}
+
+
+class Kind:
+    """What the kinds of case files share: the keys `along`, `over` and `summary`. A kind adds ``sample``.
+
+    ``keys`` are those that mean something to it; any other is refused. ``over`` is the window or None,
+    ``axis`` the direction `along` (3,) or None, ``words`` says what the summary is.
+    """
+
+    keys: ClassVar[tuple[str, ...]] = ()
+    along: ClassVar[tuple[float, float, float] | None] = None  # where it is not given
+    fitted: ClassVar[bool] = False  # the summary is a fit to the series
+    dimension = "1"
+    summary_dimension = "1"
+    description = ""  # of the series
+    number: ClassVar[str] = ""  # what the summary is, where it is a fit
+
+    def __init_subclass__(cls, kind: str = "") -> None:
+        """Enter the class as the kind of that name. Only a fit's dimension is not its series' own."""
+        if kind:
+            KINDS[kind] = cls
+        if not cls.fitted:
+            cls.summary_dimension = cls.dimension
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        given = sorted(observe.model_fields_set - {"kind", "filament"})
+        for key in given:
+            if key not in self.keys and getattr(observe, key) != type(observe).model_fields[key].default:
+                allowed = f"nothing; {observe.kind} has {', '.join(self.keys)}"
+                raise Unfit(key, getattr(observe, key), allowed)
+        self.filament = observe.filament
+        self.over, self._how = observe.over, observe.summary
+        along = observe.along or self.along
+        self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
+        details = [f"{key} = {_shown(getattr(observe, key))}" for key in ("at", "along", "space") if key in given]
+        self.description = ", ".join([f"{self.description} of {observe.filament}", *details])
+        how = "" if self.fitted else _SUMMARIES[observe.summary].words
+        over = [] if observe.over is None else [f"over = {_shown(observe.over)}"]
+        what = f"{self.number or how + type(self).description} of {observe.filament}"
+        self.words = ", ".join([what, *details, *over])
+
+    def sample(self, frame: Frame) -> Value:
+        """Value at one output."""
+        raise NotImplementedError
+
+    @property
+    def vector(self) -> bool:
+        """Whether the series is (T, 3)."""
+        return False
+
+    def window(self, times: np.ndarray) -> tuple[float, float]:
+        """Start and end of `over`, as far as the run went."""
+        start, end = (times[0], times[-1]) if self.over is None else self.over
+        return float(max(start, times[0])), float(min(end, times[-1]))
+
+    def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
+        """Return the last, mean (over time), max, min or median of the outputs in `over`."""
+        start, end = self.window(times)
+        return plain(_SUMMARIES[self._how].of(times, samples, start, end))
+
+
+KINDS: dict[str, type[Kind]] = {}
+
+
+def plain(value: np.ndarray) -> Value:
+    """Return a float for an array (), any other array as it is."""
+    return float(value) if np.ndim(value) == 0 else np.asarray(value)

@@ -1,0 +1,49 @@
+"""From the [observe] tables of a case to its observables."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ..errors import CaseError
+from .base import KINDS, Observable, Unfit
+from .observers import Observers
+
+if TYPE_CHECKING:
+    from ..case.schema import Case
+
+
+def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Observers:
+    """Make the observables of a case, and take in ``extra`` ones made in Python.
+
+    Raises CaseError, a line for each observable or stop rule that asks for what its kind does not have.
+    """
+    from . import fitted, local  # noqa: F401  (they fill KINDS)
+    from .stop_rules import stop_faults
+
+    made: dict[str, Observable] = {}
+    faults: list[str] = []
+    for name, observe in case.observe.items():
+        try:
+            made[name] = KINDS[observe.kind](case, observe)
+        except Unfit as fault:
+            faults.append(f"{case.file}: observe.{name}.{fault}")
+    if not faults:
+        made.update(extra or {})
+        faults = stop_faults(case, made)
+    if faults:
+        raise CaseError(faults)
+    return Observers(made)
+
+
+def kinds_text() -> str:
+    """What each kind of observable is and which keys it has, for `ibfil schema`."""
+    from . import fitted, local  # noqa: F401  (they fill KINDS)
+
+    lines = ["The kinds of [observe.NAME]: what each takes at an output, or of the run, and the keys it has"]
+    for name, kind in KINDS.items():
+        meaning = " ".join((kind.__doc__ or "").split("\n\n")[0].split()).rstrip(".")
+        line = f"{name}: {meaning} ({', '.join(kind.keys)})"
+        lines.append(textwrap.fill(line, 112, initial_indent="  ", subsequent_indent="      "))
+    return "\n".join(lines)

@@ -1,0 +1,387 @@
+"""The kinds of observables a case may name, `kind = ...` in [observe.NAME], that are read off each output.
+
+One class a kind. Points between nodes are on the cubic through the four nodes around them; directions are in
+the lab frame. Those whose number is fitted to the whole run are in fitted.py.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ..case.filament import single
+from ..case.spacing import node_arclength
+from ..errors import CaseError
+from ..io.frames import FilamentFrame, Frame
+from .base import Kind, Unfit, Value
+from .place import Place, reduced
+from .time_series import trapezoid_weights
+
+if TYPE_CHECKING:
+    from ..case.schema import Case, Observe
+
+
+SUMMARY = ("over", "summary")
+POINTS = "start, finish, middle, an arclength or a window [s1, s2]"
+
+
+MEANS, WINDOWS = ("mean",), ("mean", "max", "min")  # what may be asked of the points of a window
+SUPPORTS = {"start": (-1.0, 0), "finish": (1.0, -1)}  # sign of the moment that a support gives, and its node
+
+
+class OfFilament(Kind):
+    """A kind that looks at one filament; ``s`` (N,) is its arclength."""
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        filament = single(case.filaments, self.filament)
+        assert filament is not None  # case/consistency.py
+        self.model = filament
+        self.length, self.s = filament.length, node_arclength(filament)
+        self.share = trapezoid_weights(self.s) / self.length  # (N,) of each node in the filament
+
+    def look(self, frame: Frame) -> FilamentFrame:
+        """Return this filament at one output. Raises CaseError for a copy beyond those that a file has placed."""
+        if self.filament not in frame.filaments:
+            names = list(frame.filaments)
+            raise CaseError([f'an observable: filament: found "{self.filament}"; allowed: {names[0]} to {names[-1]}'])
+        return frame.filaments[self.filament]
+
+
+class AtPlace(OfFilament):
+    """A kind that looks at a point, or at a window through `space`."""
+
+    keys: ClassVar[tuple[str, ...]] = ("at", "space", *SUMMARY)
+    default_at: ClassVar[str] = "finish"
+    refused: ClassVar[tuple[str, ...]] = ()  # names of places that mean nothing here
+    mean_only: ClassVar[bool] = False  # of a window
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        self.at = observe.at if "at" in observe.model_fields_set else self.default_at
+        if self.at in self.refused:
+            raise Unfit("at", self.at, POINTS)
+        self.space = observe.space
+        mean_only = self.mean_only or self.vector
+        if isinstance(self.at, tuple) and self.space not in (MEANS if mean_only else WINDOWS):
+            words = '"mean"' if mean_only else '"mean", "max" or "min"'
+            more = "" if self.mean_only or not self.vector else '; "max" and "min" with `along`'
+            raise Unfit("space", self.space, f"{words} where `at` is a window{more}")
+        self.place = Place(self.s, self.at)
+
+    def point(self, field: np.ndarray) -> np.ndarray:
+        """Return a nodal field (N, 3) at the point, or its mean over the window: (3,)."""
+        return self.place.reduced(self.place.values(field), "mean")
+
+
+class Component(AtPlace):
+    """A vector at a place, or its component along `along`."""
+
+    keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", *SUMMARY)
+
+    @property
+    def vector(self) -> bool:
+        """Without `along`."""
+        return self.axis is None
+
+    def reduce(self, field: np.ndarray) -> Value:
+        """Return the component (or vector) of a nodal field (N, 3) at the place."""
+        if self.axis is None:
+            return self.point(field)
+        return float(self.place.reduced(self.place.values(field @ self.axis), self.space))
+
+
+class Position(Component, kind="position"):
+    """Position r, or its component."""
+
+    dimension = "length"
+    description = "position"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        return self.reduce(self.look(frame).position)
+
+
+class Velocity(Component, kind="velocity"):
+    """Velocity u, or its component."""
+
+    dimension = "length/time"
+    description = "velocity"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        return self.reduce(self.look(frame).velocity)
+
+
+class Displacement(Component, kind="displacement"):
+    """Position minus that at the first output, or its component."""
+
+    dimension = "length"
+    description = "displacement since the start"
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        self._first: np.ndarray | None = None
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        position = self.look(frame).position
+        if self._first is None:
+            self._first = position.copy()
+        return self.reduce(position - self._first)
+
+
+class Speed(AtPlace, kind="speed"):
+    """Size of the velocity, |u|."""
+
+    dimension = "length/time"
+    description = "speed"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        values = np.linalg.norm(self.place.values(self.look(frame).velocity), axis=1)
+        return float(self.place.reduced(values, self.space))
+
+
+class Amplitude(AtPlace, kind="amplitude"):
+    """Distance from the line through the node at s = 0 along `along` (default x)."""
+
+    keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", *SUMMARY)
+    along = (1.0, 0.0, 0.0)
+    dimension = "length"
+    description = "distance from the line through the start"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        position = self.look(frame).position
+        across = _distance_across(self.place.values(position) - position[0], self.axis)
+        return float(self.place.reduced(across, self.space))
+
+
+class Twist(AtPlace, kind="twist"):
+    """Strain Omega_3."""
+
+    refused = ("centroid",)
+    dimension = "rad/length"
+    description = "twist Omega_3"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        values = self.place.values(self.look(frame).strain[:, 2])
+        return float(self.place.reduced(values, self.space))
+
+
+class Stretch(AtPlace, kind="stretch"):
+    """Length over rest length, minus 1, of the segment that holds the place.
+
+    In a window: of the segments whose middles lie in it.
+    """
+
+    refused = ("centroid",)
+    description = "stretch of the segments"
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        self.ds = np.diff(self.s)
+        if isinstance(self.at, tuple):
+            middles = self.s[:-1] + 0.5 * self.ds
+            self.chosen = np.nonzero((middles >= self.at[0]) & (middles <= self.at[1]))[0]
+            if len(self.chosen) == 0:
+                raise Unfit("at", self.at, "a window that holds the middle of a segment")
+        else:
+            named = {"start": 0.0, "middle": 0.5 * self.length, "finish": self.length}
+            where = float(named[self.at] if isinstance(self.at, str) else self.at)
+            self.chosen = np.array([min(int(np.searchsorted(self.s[1:], where)), len(self.ds) - 1)])
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        lengths = np.linalg.norm(np.diff(self.look(frame).position, axis=0), axis=1)
+        values, weights = (lengths / self.ds - 1.0)[self.chosen], self.ds[self.chosen]
+        return float(reduced(self.space, weights / weights.sum(), values))
+
+
+class EndToEnd(OfFilament, kind="end_to_end"):
+    """Distance of the two ends."""
+
+    keys = SUMMARY
+    dimension = "length"
+    description = "distance of the two ends"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        position = self.look(frame).position
+        return float(np.linalg.norm(position[-1] - position[0]))
+
+
+class TurnAngle(OfFilament, kind="turn_angle"):
+    """Angle the chord from start to finish has turned through since the first output.
+
+    With `along`: about that axis, right-handed and continuous (less than half a turn from one output to the
+    next). Without: between the two directions, from 0 to pi.
+    """
+
+    keys: ClassVar[tuple[str, ...]] = ("along", *SUMMARY)
+    dimension = "rad"
+    description = "angle the chord has turned since the start"
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        self._first: np.ndarray | None = None
+        self._last = 0.0
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        position = self.look(frame).position
+        chord = position[-1] - position[0]
+        if self.axis is not None:
+            chord = chord - (chord @ self.axis) * self.axis
+        if self._first is None:
+            self._first = chord
+        turned = np.cross(self._first, chord)
+        if self.axis is None:
+            return float(np.arctan2(np.linalg.norm(turned), self._first @ chord))
+        angle = float(np.arctan2(turned @ self.axis, self._first @ chord))
+        self._last = angle + 2 * np.pi * round((self._last - angle) / (2 * np.pi))
+        return self._last
+
+
+class Windowed(OfFilament):
+    """A kind that looks at the nodes of a window, by default the whole filament."""
+
+    keys: ClassVar[tuple[str, ...]] = ("at", *SUMMARY)
+    supports: ClassVar[bool] = False  # whether start and finish stand for the supports there
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        at = observe.at if "at" in observe.model_fields_set else (0.0, self.length)
+        self.at: tuple[float, float] = (0.0, self.length)
+        self.end = ""
+        if isinstance(at, tuple):
+            self.at = at
+        elif self.supports and at in SUPPORTS:
+            self.end = str(at)
+            if not getattr(self.model, self.end).held:
+                raise Unfit("at", at, "an end that is held; a free end has no support")
+        else:
+            words = '"start" or "finish" for the support there, ' if self.supports else ""
+            raise Unfit("at", at, f"{words}a window [s1, s2], or nothing for the whole filament")
+        slack = 1e-9 * self.length
+        self.inside = (self.s >= self.at[0] - slack) & (self.s <= self.at[1] + slack)
+
+
+class Radius(Windowed, kind="radius"):
+    """Distance of a window's points from its centroid, across `along` (default x): their mean, max or min."""
+
+    keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", *SUMMARY)
+    along = (1.0, 0.0, 0.0)
+    dimension = "length"
+    description = "distance from the centroid, across the axis"
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        self.space = observe.space
+        if not observe.reduces:
+            raise Unfit("space", self.space, '"mean", "max" or "min"')
+        self.place = Place(self.s, self.at)
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        points = self.place.values(self.look(frame).position)
+        across = _distance_across(points - self.place.reduced(points, "mean"), self.axis)
+        return float(self.place.reduced(across, self.space))
+
+
+class OnFluid(Windowed):
+    """A vector or its component: summed over the nodes of a window, or of the support of an end."""
+
+    keys: ClassVar[tuple[str, ...]] = ("at", "along", *SUMMARY)
+    supports = True
+
+    @property
+    def vector(self) -> bool:
+        """Without `along`."""
+        return self.axis is None
+
+    def component(self, value: np.ndarray) -> Value:
+        """Return the component of a vector (3,), or itself."""
+        return value if self.axis is None else float(value @ self.axis)
+
+
+class Force(OnFluid, kind="force"):
+    """Force of a window's nodes on the fluid; at start or finish, of the support there on the filament."""
+
+    dimension = "force"
+    description = "force"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        filament = self.look(frame)
+        if self.end:
+            return self.component(getattr(filament, f"reaction_{self.end}"))
+        return self.component(filament.force[self.inside].sum(axis=0))
+
+
+class Torque(OnFluid, kind="torque"):
+    """Torque of a window's nodal forces on the fluid about the filament's centroid, twist torques included.
+
+    At start or finish: the couple of the support there on the filament, -M(0) or M(L).
+    """
+
+    dimension = "force length"
+    description = "torque"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        filament = self.look(frame)
+        if self.end:
+            sign, node = SUPPORTS[self.end]
+            return self.component(sign * _lab_moment(filament, self.s, node))
+        arms = filament.position - self.share @ filament.position
+        torque = np.cross(arms, filament.force)
+        if filament.torque is not None:
+            torque = torque + filament.torque
+        return self.component(torque[self.inside].sum(axis=0))
+
+
+class Power(Windowed, kind="power"):
+    """Power of a window's nodal forces and twist torques on the fluid, sum of F.u + T.w."""
+
+    dimension = "force length/time"
+    description = "power on the fluid"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        filament = self.look(frame)
+        return float(np.sum(filament.power[self.inside]))
+
+
+class Dissipation(Kind, kind="dissipation"):
+    """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
+
+    On a grid it costs an evaluation of the fluid at each output.
+    """
+
+    keys: ClassVar[tuple[str, ...]] = SUMMARY
+    dimension = "force length/time"
+    description = "power turned into heat by the fluid, filaments together, one"
+
+    def sample(self, frame: Frame) -> Value:
+        """At one output."""
+        return float(frame.diagnostics["dissipation"])
+
+
+def _distance_across(points: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
+    """Distance (m,) of points (m, 3) from the line through the origin along ``axis``."""
+    assert axis is not None  # these kinds have a default
+    return np.linalg.norm(np.cross(points, axis), axis=1)
+
+
+def _lab_moment(filament: FilamentFrame, s: np.ndarray, node: int) -> np.ndarray:
+    """Moment (3,) at an end node in the lab frame; its tangent by one-sided differences of second order."""
+    three = slice(0, 3) if node == 0 else slice(-3, None)
+    e1 = filament.e1[node]
+    tangent = np.gradient(filament.position[three], s[three], axis=0, edge_order=2)[node]
+    tangent = tangent - (tangent @ e1) * e1
+    e3 = tangent / np.linalg.norm(tangent)
+    return filament.moment[node] @ np.array([e1, np.cross(e3, e1), e3])

@@ -1,0 +1,79 @@
+"""The observables of a run, and what they have recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..io.frames import Frame
+from .base import Observable, Value, _shown
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The number of one observable; ``note`` is not empty where it does not cover all that was asked for."""
+
+    value: Value
+    note: str = ""
+
+
+class Observers:
+    """The observables of a run, and what they have seen."""
+
+    def __init__(self, observables: Mapping[str, Observable]) -> None:
+        self.observables = dict(observables)
+        self._times: list[float] = []
+        self._series: dict[str, list[Value]] = {name: [] for name in observables}
+
+    def take(self, frame: Frame) -> dict[str, Value]:
+        """Look at one output; the values by name."""
+        values = {name: observable.sample(frame) for name, observable in self.observables.items()}
+        self._times.append(frame.time)
+        for name, value in values.items():
+            self._series[name].append(value)
+        return values
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the outputs seen (T,)."""
+        return np.array(self._times)
+
+    def series(self, name: str) -> np.ndarray:
+        """Series (T,) or (T, 3) of one observable."""
+        return np.array(self._series[name], float)
+
+    def since(self, name: str, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return times and values from the last output at or before ``time`` on (else from the first one)."""
+        first = max(int(np.searchsorted(self._times, time, side="right")) - 1, 0)
+        return np.array(self._times[first:]), np.array(self._series[name][first:], float)
+
+    def last(self, name: str) -> Value:
+        """Return the value at the last output."""
+        return self._series[name][-1]
+
+    def summaries(self) -> dict[str, Summary]:
+        """Return the number of every observable."""
+        return summaries(self.observables, self.times, {name: self.series(name) for name in self.observables})
+
+
+def summaries(
+    observables: Mapping[str, Observable], times: np.ndarray, series: Mapping[str, np.ndarray]
+) -> dict[str, Summary]:
+    """Return the number of every observable from its series; noted where the run ended before `over` did."""
+    found = {}
+    for name, observable in observables.items():
+        over, end, note = getattr(observable, "over", None), float(times[-1]), ""
+        samples = np.asarray(series[name], float)
+        value: Value = float("nan") if samples.ndim == 1 else np.full(3, np.nan)
+        if over is not None and end < over[1] - 1e-9 * abs(over[1]):
+            note = f"the run ended at {end:.6g}, within `over` = {_shown(over)}"
+        if over is None or end >= over[0]:
+            value = observable.summary(times, samples)
+        found[name] = Summary(value, note)
+    return found

@@ -1,0 +1,1 @@
+"""Running a case from its start, or on from a checkpoint."""

@@ -1,0 +1,309 @@
+"""The loop of a run: steps between outputs; at each output the record, the observables, the stop rules."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..errors import Interrupted, RunFailed, Stopped
+from ..io import checkpoint
+from ..io.pace import Pace
+from ..io.reader import checkpoint_path
+from ..io.writer import GridPlace, Meaning, Recorder, record_end
+from ..observables.expectations import Check, check
+from ..observables.observers import Observers, Summary
+from ..observables.stop_rules import StopRules
+from .progress import Progress, Signals
+from .schedule import SAME, Due, due_times
+
+if TYPE_CHECKING:
+    from ..case.schema import Case
+    from ..io.frames import Frame
+    from ..simulation.simulation import Simulation
+
+
+_LOOK = 0.2  # seconds between two looks at clocks and progress
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run gave. ``status`` is finished, or stopped for the ``reason`` of a stop rule.
+
+    ``frame`` is the last output; ``path`` the run file, None where none was written; ``wall_time`` in
+    seconds.
+    """
+
+    case: Case
+    status: str
+    reason: str
+    path: Path | None
+    steps: int
+    wall_time: float
+    frame: Frame
+    observers: Observers
+
+    def __repr__(self) -> str:
+        found = ", ".join(
+            f"{name} = {np.array2string(np.asarray(one.value), precision=6)}" for name, one in self.summaries.items()
+        )
+        return f"<Result {self.status}: {self.steps} steps, t = {self.frame.time:g}; {found or 'no observables'}>"
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the outputs (T,)."""
+        return self.observers.times
+
+    def series(self, name: str) -> np.ndarray:
+        """Return an observable's values (T,) or (T, 3)."""
+        return self.observers.series(name)
+
+    @property
+    def summaries(self) -> dict[str, Summary]:
+        """The number of every observable."""
+        return self.observers.summaries()
+
+    @property
+    def checks(self) -> list[Check]:
+        """The case's expectations held against them."""
+        return check(self.case, self.summaries)
+
+
+class Loop:
+    """A simulation and everything around it. ``start`` or ``go_on`` runs it to its end, once."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        seen: Observers,
+        log: Callable[[str], object],
+        progress: bool,
+        rules: StopRules | None = None,
+    ) -> None:
+        self.simulation, self.case, self._seen = simulation, simulation.case, seen
+        self._rules = rules or StopRules(self.case, seen)
+        self._log, self._show = log, progress
+        self._signals = Signals()
+        self._recorder: Recorder | None = None
+        self._path: Path | None = None
+        self._frame: Frame | None = None
+        self._began, self._spent = clock.monotonic(), 0.0  # now; seconds spent by the parts of the run before
+        self._pace = Pace()
+        self._next_look = self._next_checkpoint = 0.0
+        self._good: float | None = None  # time of the last checkpoint
+        self._progress: Progress | None = None
+
+    def start(self, path: Path | None, overwrite: bool, groups: Mapping[str, float]) -> Result:
+        """From the state the simulation is in; ``path`` None writes nothing. ``groups``: the dimensionless ones."""
+        first, *rest = due_times(self.case, self.simulation.grid is not None)
+        self._path = path
+
+        def work() -> tuple[str, str]:
+            frame = self._frame = self.simulation.frame(self._fields(first))
+            values = self._seen.take(frame)
+            if path is not None:
+                meanings = {
+                    name: Meaning(observable.dimension, observable.description)
+                    for name, observable in self._seen.observables.items()
+                }
+                self._recorder = Recorder.create(
+                    path,
+                    self.case,
+                    frame,
+                    values,
+                    meanings,
+                    grid=self._grid_place(),
+                    method=self.simulation.method,
+                    wisdom=self.simulation.wisdom,
+                    groups=groups,
+                    expected=sum(due.output for due in rest) + 1,
+                    overwrite=overwrite,
+                )
+                if frame.grid:
+                    self._recorder.append_fields(frame.time, frame.grid)
+                self._checkpoint()
+            reason = self._rules.check(frame.time)
+            return ("stopped", reason) if reason else self._steps(rest)
+
+        return self._guarded(work)
+
+    def go_on(self, path: Path, last: checkpoint.Checkpoint, fields_at: float) -> Result:
+        """From a checkpoint the simulation has taken up; ``fields_at`` is when fields were last written."""
+        self._path, self._spent, self._good = path, last.wall_time, last.time
+
+        def work() -> tuple[str, str]:
+            self._frame = self.simulation.frame()
+            self._recorder = Recorder.resume(path, self.case, last.outputs, last.fields, self._grid_place())
+            self._pace = Pace(self._recorder.pace)
+            self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
+            slack, written = SAME * self.case.time.end, float(self._seen.times[-1])
+            rest = []
+            for due in due_times(self.case, self.simulation.grid is not None):
+                output, fields = (
+                    due.output and due.time > written + slack,
+                    due.fields and due.time > fields_at + slack,
+                )
+                if due.time > self.simulation.time - slack and (output or fields):
+                    rest.append(Due(due.time, output, fields))
+            return self._steps(rest)
+
+        return self._guarded(work)
+
+    def _steps(self, dues: Sequence[Due]) -> tuple[str, str]:
+        """Go from one due time to the next; how it ended."""
+        simulation, slack = self.simulation, SAME * self.case.time.end
+        self._progress = Progress(simulation.time, self.case.time.end, self._log, self._show)
+        for due in dues:
+            if due.time > simulation.time + slack:
+                try:
+                    simulation.advance(due.time, self._after_step)
+                except Stopped as stopped:
+                    if self._frame is None or simulation.time > self._frame.time:
+                        self._output(simulation.frame())
+                    return "stopped", str(stopped)
+            with self._pace.paused():
+                reason = self._look(due)
+            if reason:
+                return "stopped", reason
+        return "finished", ""
+
+    def _look(self, due: Due) -> str:
+        """What is due now; the stop rule that is true, if one is."""
+        frame = self.simulation.frame(self._fields(due))
+        if due.fields and frame.grid and self._recorder is not None:
+            self._recorder.append_fields(frame.time, frame.grid)
+        if not due.output:
+            return ""
+        self._output(frame)
+        return self._rules.check(frame.time)
+
+    def _output(self, frame: Frame) -> None:
+        self._frame = frame
+        values = self._seen.take(frame)
+        if self._recorder is not None:
+            self._recorder.append(frame, values)
+
+    def _after_step(self) -> None:
+        self._pace.step(self.simulation.time)
+        while self.simulation.notices:
+            self._log(f"warning: {self.simulation.notices.pop(0)}")
+        if self._signals.caught:
+            raise Interrupted
+        now = clock.monotonic()
+        if now >= self._next_look:
+            self._next_look = now + min(_LOOK, self.case.output.checkpoint_every)
+            assert self._progress is not None
+            self._progress.tell(self.simulation.time, self.simulation.steps)
+            if self._recorder is not None:
+                self._recorder.settle()
+                if now >= self._next_checkpoint:
+                    self._checkpoint()
+
+    def _fields(self, due: Due) -> Sequence[str]:
+        return self.case.output.fields if due.fields else ()
+
+    def _grid_place(self) -> GridPlace | None:
+        grid = self.simulation.grid
+        return None if grid is None else GridPlace(grid.origin, grid.spacing, self.case.output.grid_stride)
+
+    def _wall_time(self) -> float:
+        return self._spent + clock.monotonic() - self._began
+
+    def _attributes(self) -> dict[str, Any]:
+        simulation = self.simulation
+        pace = self._pace.attributes(simulation.time)
+        return {"steps": simulation.steps, "wall_time": self._wall_time(), "wisdom": simulation.wisdom, **pace}
+
+    def _checkpoint(self) -> None:
+        """Have all outputs so far on the disk, then the state. Raises RunFailed."""
+        recorder, path, simulation = self._recorder, self._path, self.simulation
+        assert recorder is not None
+        assert path is not None
+        recorder.write(**self._attributes())
+        place = checkpoint_path(path)
+        try:
+            checkpoint.write(
+                place,
+                checkpoint.Checkpoint(
+                    state=simulation.state(),
+                    time=simulation.time,
+                    steps=simulation.steps,
+                    outputs=recorder.outputs,
+                    fields=recorder.fields,
+                    wall_time=self._wall_time(),
+                    case=self.case.text,
+                    file=self.case.file,
+                    wisdom=simulation.wisdom,
+                    created=recorder.created,
+                ),
+            )
+        except OSError as error:
+            raise RunFailed(
+                f"{place} cannot be written ({error.strerror or error})",
+                time=simulation.time,
+                advice="free some space; the outputs up to here are in the run file",
+            ) from error
+        self._good = simulation.time
+        self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
+
+    def _guarded(self, work: Callable[[], tuple[str, str]]) -> Result:
+        """Do the work, and leave the files as they should be however it ends."""
+        try:
+            # Small dense solves on all cores of a busy machine are some forty times slower than on one: threads are
+            # for the transforms.
+            with self._signals, threadpool_limits(limits=1, user_api="blas"):
+                try:
+                    status, reason = work()
+                except (Interrupted, BrokenPipeError):  # the pipe it speaks into: `ibfil run CASE | head`
+                    raise self._interrupted() from None
+                return self._finished(status, reason)
+        except Interrupted:
+            raise
+        except RunFailed as failure:
+            self._failed(failure.message if failure.time is None else str(failure))
+            if self._good is not None:
+                place = checkpoint_path(self._path) if self._path else ""
+                more = f"the last good checkpoint is {place}, t = {self._good:.6g}"
+                failure.advice = f"{failure.advice}; {more}" if failure.advice else more
+            raise
+        except BaseException as error:
+            self._failed(f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            if self._progress is not None:
+                self._progress.close()
+            if self._recorder is not None:
+                self._recorder.close()
+
+    def _finished(self, status: str, reason: str) -> Result:
+        """Close the run file and remove the checkpoint."""
+        if self._recorder is not None and self._path is not None:
+            self._recorder.finish(status, reason, **self._attributes())
+            checkpoint_path(self._path).unlink(missing_ok=True)
+        assert self._frame is not None
+        steps, wall_time = self.simulation.steps, self._wall_time()
+        return Result(self.case, status, reason, self._path, steps, wall_time, self._frame, self._seen)
+
+    def _interrupted(self) -> Interrupted:
+        """Write a checkpoint, and say how to go on."""
+        line = f"interrupted at t = {self.simulation.time:.6g}"
+        if self._recorder is None:
+            return Interrupted(f"{line}; nothing was written")
+        self._checkpoint()
+        self._recorder.finish("interrupted", line, **self._attributes())
+        return Interrupted(f"{line}; go on with: ibfil run --resume {self._path}")
+
+    def _failed(self, reason: str) -> None:
+        """Note it in the run file, or try to."""
+        if self._recorder is None or self._path is None:
+            return
+        try:
+            self._recorder.finish("failed", reason, **self._attributes())
+        except Exception:  # what went wrong first is what counts
+            self._recorder.close()
+            record_end(self._path, "failed", reason)

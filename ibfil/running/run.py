@@ -1,0 +1,196 @@
+"""Running a case from its start, or on from a checkpoint. What happens on the way is in loop.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..case.reading import differences, parse_case, read_case, written
+from ..check.overview import Overview, overview_of
+from ..errors import CaseError
+from ..io import checkpoint, journal
+from ..io.provenance import versions
+from ..io.reader import RunFile, RunFileError, checkpoint_path, journal_path
+from ..io.writer import refuse_existing
+from ..observables.base import Observable
+from ..observables.factory import observers
+from ..observables.observers import Observers
+from ..observables.stop_rules import StopRules
+from .loop import Loop, Result
+
+if TYPE_CHECKING:
+    from ..case.schema import Case
+    from ..rods.constitutive import MomentLaw
+    from ..simulation.simulation import Simulation
+
+    Build = Callable[[Case, str], Simulation]
+    Look = Callable[[Simulation], Overview]
+
+
+def run(
+    case: Case | str | Path,
+    output: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: bool = True,
+    log: Callable[[str], object] = print,
+    observables: Mapping[str, Observable] | None = None,
+    laws: Mapping[str, MomentLaw] | None = None,
+    build: Build | None = None,
+    look: Look = overview_of,
+) -> Result:
+    """Run a case (or the case file of that name) and write the run file ``output``; None writes nothing.
+
+    With ``resume`` it goes on from the checkpoint of ``output`` if there is one. ``observables`` are further ones, made
+    in Python, and ``laws`` constitutive laws by filament (rods/constitutive.py). ``build`` makes the simulation from
+    the case and FFTW wisdom, by default `Simulation` with
+    these laws, and ``look`` says what is told of it before it runs.
+
+    Raises CaseError (also where ``output`` exists and ``overwrite`` is not set), RunFailed, and Interrupted
+    after Ctrl-C or SIGTERM; a second one kills.
+
+    >>> result = ibfil.run("case.toml", progress=False, log=lambda line: None)
+    >>> print(result.status, result.times.shape, result.series("tip").shape)
+    finished (3,) (3, 3)
+    """
+    if isinstance(case, str | Path):
+        case = read_case(case)
+    build = build or _builder(laws)
+    path = None if output is None else Path(output)
+    if path is not None and resume and checkpoint_path(path).exists():
+        return resume_run(path, case, progress=progress, log=log, observables=observables, build=build, look=look)
+    seen = observers(case, observables)
+    if path is not None:
+        refuse_existing(path, overwrite)
+    simulation = build(case, "")
+    overview = look(simulation)
+    for line in _banner(simulation, overview):
+        log(line)
+    return Loop(simulation, seen, log, progress).start(path, overwrite, overview.groups)
+
+
+def resume_run(
+    path: str | Path,
+    case: Case | None = None,
+    overrides: Sequence[str] = (),
+    *,
+    progress: bool = True,
+    log: Callable[[str], object] = print,
+    observables: Mapping[str, Observable] | None = None,
+    laws: Mapping[str, MomentLaw] | None = None,
+    build: Build | None = None,
+    look: Look = overview_of,
+) -> Result:
+    """Go on with the run in ``path`` from its last checkpoint, bit for bit as if it had never been cut.
+
+    The case is the one it began with, or ``case``, or that with ``overrides``: only time.end and output may
+    differ. The run file is cut back to the checkpoint; a torn one is put right, and one damaged beyond that
+    is computed anew. ``laws`` made in Python have to be given again. Raises as `run`, and RunFileError (a
+    CaseError) where there is nothing to go on from.
+    """
+    path, build = Path(path), build or _builder(laws)
+    if journal.is_being_written(journal_path(path)):
+        raise RunFileError(f"{path}: is being written by another ibfil that is still running")
+    last = _last_checkpoint(path)
+    began = parse_case(last.case, last.file)
+    case = _goes_on(began, case or parse_case(last.case, last.file, overrides), last)
+    seen = observers(case, observables)
+    rules = StopRules(case, seen)
+    try:
+        if journal.recover(path, journal_path(path)):
+            log(f"{path} was torn when its run was killed; put back to its last whole write")
+        fields_at, other = _replay(path, last, seen, rules)
+    except (RunFileError, OSError, KeyError, ValueError, RuntimeError) as damage:
+        log(f"{path} cannot be used ({_why(damage)}); rebuilt by computing it again from t = 0")
+        return run(
+            case, path, overwrite=True, progress=progress, log=log, observables=observables, build=build, look=look
+        )
+    simulation = build(case, last.wisdom)
+    try:
+        simulation.restore(dict(last.state))
+    except KeyError as missing:
+        place, wrote = checkpoint_path(path), "another version of ibfil wrote it: go on with that one"
+        raise RunFileError(f"{place}: has no {missing} in its state; {wrote}") from None
+    if other:
+        log(f"warning: {other}; the rest may differ in the last digits from a run that was not cut")
+    log(f"going on with {path} from t = {last.time:.6g}, after {last.outputs} outputs and {last.steps} steps")
+    return Loop(simulation, seen, log, progress, rules).go_on(path, last, fields_at)
+
+
+def _builder(laws: Mapping[str, MomentLaw] | None) -> Build:
+    def build(case: Case, wisdom: str) -> Simulation:
+        from ..simulation.simulation import Simulation
+
+        return Simulation(case, wisdom, laws or {})
+
+    return build
+
+
+def _banner(simulation: Simulation, overview: Overview) -> Iterator[str]:
+    """Say what a run begins with: the case, the dimensionless groups, the warnings."""
+    case = simulation.case
+    if case.title:
+        yield case.title
+    scheme = f"{case.time.scheme} of order {case.time.order}"
+    yield f"fluid {case.fluid.model}, method {simulation.method}, {scheme}"
+    if overview.groups:
+        yield "  ".join(f"{name} = {value:.4g}" for name, value in overview.groups.items())
+    for warning in overview.warnings:
+        yield f"warning: {warning}"
+
+
+def _last_checkpoint(path: Path) -> checkpoint.Checkpoint:
+    beside = checkpoint_path(path)
+    if not beside.exists():
+        status = ""
+        if path.exists():
+            with RunFile(path) as run_file:
+                status = f"; its run is {run_file.status}"
+                if run_file.status in ("finished", "stopped"):
+                    status += ', and a new one may start from its last frame: shape = { kind = "run", path = ... }'
+        raise RunFileError(f"{path}: no checkpoint {beside.name} to go on from{status}")
+    return checkpoint.read(beside)
+
+
+def _goes_on(began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
+    """Return the case to go on with. Raises CaseError where more than time.end and output differs."""
+    faults = [
+        f"{case.file}: {key}: found {written(now)}; the run began with {written(then)}, and only time.end and output "
+        'may change: go on without that, or begin a new run (shape.kind = "run" starts from a frame of this one)'
+        for key, (then, now) in differences(began, case).items()
+        if key != "time.end" and key.split(".")[0] != "output"
+    ]
+    if case.time.end < last.time:
+        allowed = f"at least {last.time:g}, where the run is"
+        faults.append(f"{case.file}: time.end: found {case.time.end:g}; allowed: {allowed}")
+    if faults:
+        raise CaseError(faults)
+    return case
+
+
+def _replay(path: Path, last: checkpoint.Checkpoint, seen: Observers, rules: StopRules) -> tuple[float, str]:
+    """Show the outputs up to the checkpoint to all that looks.
+
+    Gives the time of the last fields, -1 if there are none, and in words which versions have changed. Raises
+    RunFileError where the run file has not got all outputs, and whatever h5py raises where it cannot read them.
+    """
+    with RunFile(path) as run_file:
+        if run_file.created != last.created:
+            raise CaseError([f"{path}: its checkpoint {checkpoint_path(path).name} belongs to another run"])
+        grid = run_file.grid
+        if len(run_file) < last.outputs or (0 if grid is None else len(grid.time)) < last.fields:
+            raise RunFileError(f"{path}: ends before its checkpoint")
+        for frame in run_file.frames(0, last.outputs):
+            seen.take(frame)
+            rules.check(frame.time)
+        began, now = run_file.versions, versions()
+        other = [f"{name} is {v}, was {began.get(name, 'none')}" for name, v in now.items() if v != began.get(name)]
+        fields_at = -1.0 if grid is None or last.fields == 0 else float(grid.time[last.fields - 1])
+    return fields_at, ", ".join(other)
+
+
+def _why(damage: Exception) -> str:
+    line = damage.faults[0] if isinstance(damage, CaseError) else str(damage)
+    return line.splitlines()[0] if line else type(damage).__name__

@@ -1,0 +1,1 @@
+"""The shapes that filaments begin with."""

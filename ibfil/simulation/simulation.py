@@ -1,0 +1,344 @@
+"""A running case: its present state, and the loop that steps it on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import CaseError, RunFailed
+from ..linalg.constraints import Held
+from ..rods.geometry import Geometry
+from ..timestepping.base import FAILURES, State, Step
+from ..timestepping.stability_limit import explicit_limit
+from ..timestepping.step_control import Verdict
+from . import failures, timescales
+from .diagnostics import Diagnostics, Instant
+from .model import assemble
+
+if TYPE_CHECKING:
+    from ..assembly.stacked import Stacked
+    from ..case.schema import Case
+    from ..fluids.base import Fluid
+    from ..grid.periodic_grid import Grid
+    from ..io.frames import Frame
+    from ..rods.constitutive import MomentLaw
+    from ..rods.system import Mechanics
+
+
+class Simulation:
+    """One run of a case, at the present ``time`` after ``steps`` steps; ``model`` is what the case was assembled to.
+
+    ``laws`` are constitutive laws made in Python, by filament, which go before the case's (rods/constitutive.py).
+    Raises CaseError where the scene cannot be built.
+    """
+
+    def __init__(self, case: Case, wisdom: str = "", laws: Mapping[str, MomentLaw] = MappingProxyType({})) -> None:
+        self.case = case
+        self._laws = ", ".join(f"{name}: {type(law).__qualname__}" for name, law in sorted(laws.items()))
+        self.model = assemble(case, laws, wisdom)
+        self._diagnostics = Diagnostics(self.model)
+        self.state_now = State(0.0, self.start, np.zeros((len(self.arclength), self.mechanics.unknowns)), 0.0)
+        self.steps = self._iterations = 0
+        self.notices: list[str] = []  # what has happened and nobody was told yet
+        self._told = False  # that the fluid moves too far in a step
+        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._control = timescales.control(self.model)
+
+    # -- what it is made of --------------------------------------------------------------------------------------
+
+    @property
+    def rods(self) -> Stacked:
+        """The rods of the scene."""
+        return self.model.rods
+
+    @property
+    def mechanics(self) -> Mechanics:
+        """What the rods answer: forces, stiffness."""
+        return self.model.rods.mechanics
+
+    @property
+    def fluid(self) -> Fluid:
+        """What the fluid answers."""
+        return self.model.fluid
+
+    @property
+    def grid(self) -> Grid | None:
+        """The fluid's grid; None where it has none."""
+        return self.model.grid
+
+    @property
+    def method(self) -> str:
+        """The fluid's path to velocities."""
+        return self.model.method
+
+    @property
+    def time(self) -> float:
+        """Present time, in the case's unit."""
+        return self.state_now.time
+
+    @property
+    def shape(self) -> Geometry:
+        """The present configuration of all nodes."""
+        return self.state_now.shape
+
+    @property
+    def start(self) -> Geometry:
+        """The configuration the case begins with."""
+        return self.model.rods.start
+
+    @property
+    def arclength(self) -> np.ndarray:
+        """Arclength (n,) of all nodes, 0 at each filament's start."""
+        return self.model.rods.s
+
+    def nodes(self, name: str) -> slice:
+        """The range of nodes of the filament of that name, or of its first copy."""
+        return self.model.nodes(name)
+
+    @property
+    def filaments(self) -> tuple[str, ...]:
+        """Names of all filaments, copies one by one."""
+        return self.model.rods.names
+
+    @property
+    def wisdom(self) -> str:
+        """FFTW plans in use, as one line of text; empty where no step transforms a field."""
+        if not self.model.transforms:
+            return ""
+        from ..grid import fft
+
+        return fft.wisdom()
+
+    # -- how it goes on ------------------------------------------------------------------------------------------
+
+    def advance(self, until: float, after_step: Callable[[], None]) -> None:
+        """Step to exactly ``until``; call back after each step.
+
+        Raises RunFailed where the rods diverge, over-stretch, or the step cannot be solved; Stopped at a contact
+        that ends the run.
+        """
+        if self.steps == 0:
+            self._watch(self.state_now)
+        while self.time < until:
+            self.accept(*self._solve(until))
+            after_step()
+
+    def _solve(self, until: float) -> tuple[Step, float]:
+        """The next step, made as often as it takes, and the time it leads to."""
+        while True:
+            dt, time = self._control.propose(self.state_now, until, self.longest_step())
+            try:
+                step = self.attempt(dt)
+            except FAILURES as failure:
+                self._refuse(dt, str(failure), getattr(failure, "node", None))
+                verdict = self._control.shorten(dt)
+            else:
+                verdict = self._control.judge(self.state_now, step, dt)
+                if verdict is Verdict.ACCEPTED:
+                    return step, time
+                self._refuse(dt, "the error stays above time.tolerance")
+            if verdict is Verdict.RESTARTED:
+                self.state_now = self.state_now._replace(dt_old=0.0)
+
+    def attempt(self, dt: float) -> Step:
+        """A step of length dt from the present state, not yet taken."""
+        step = self.model.stepper.step(self.mechanics, self.fluid, self.state_now, dt)
+        self.rods.contact.refuse_passing(self.shape.r, step.state.shape.r)
+        return step
+
+    def _refuse(self, dt: float, reason: str, node: int | None = None) -> None:
+        """Raises RunFailed where a step of length dt may not be tried again with half of it."""
+        if not self.may_halve(dt):
+            self._fail(failures.unsolved(reason, dt, self.case.time.min_step, node, self._known(dt)))
+
+    def may_halve(self, dt: float) -> bool:
+        """Whether a step of length dt that failed may be tried with half of it.
+
+        Not with noise: trying again only the steps whose kicks were large would bias them.
+        """
+        time = self.case.time
+        return 0.5 * dt >= time.min_step and not time.explicit and self.model.noise is None
+
+    def longest_step(self) -> float:
+        """What the fluid's own motion leaves to steps that are not given; infinite for those that are."""
+        time, longest = self.case.time, self.fluid.longest_step()
+        if time.tolerance is not None or longest == np.inf:
+            return longest
+        return self.model.fluid_model.automatic_limit(longest) if time.automatic else np.inf
+
+    @property
+    def shortened(self) -> int:
+        """How many steps had to be tried again with a shorter one."""
+        return self._control.shortened
+
+    @property
+    def step_length(self) -> float:
+        """The longest step, or with a tolerance the present one."""
+        return self._control.length
+
+    def accept(self, step: Step, time: float) -> None:
+        """Take a step, which led to ``time``. Raises RunFailed where it led out of bounds, Stopped at a contact."""
+        before, self.state_now = self.state_now, step.state._replace(time=time)
+        self.fluid.advance(step.response, step.force)
+        self._look_at_crossing(time - before.time)
+        self._last = (step.velocity, step.force, step.reaction)
+        self.steps += 1
+        if self.steps > self.case.time.max_steps:
+            limits = self.case.time
+            self._fail(failures.too_many(self.steps, limits.max_steps, limits.end, time - before.time))
+        self._iterations = step.iterations
+        self._look_at_bounds(step.state.shape, time - before.time)
+        self._watch(before)
+
+    def _look_at_bounds(self, shape: Geometry, dt: float) -> None:
+        rods = self.mechanics
+        found = failures.out_of_bounds(rods.mesh, self._twisting, rods.stretching, shape)
+        if found is not None:
+            self._fail(found.trouble(self._known(dt)))
+
+    @cached_property
+    def _twisting(self) -> np.ndarray:
+        """Which nodes twist (n,): the e1 of a filament without twisting may come to differ from node to node."""
+        rods = self.model.rods
+        return np.repeat([f.twisting is not None for f in rods.filaments], [w.stop - w.start for w in rods.nodes])
+
+    def _known(self, dt: float) -> failures.Step:
+        """What is known of a step that failed; the limit is that of the start, where the present is not finite."""
+        limit = explicit_limit(self.mechanics, self.fluid, self.start, 0.0) if self.case.time.explicit else np.inf
+        return failures.Step(dt, limit, self.case.thermal is not None and self.case.thermal.energy > 0)
+
+    def _look_at_crossing(self, dt: float) -> None:
+        """Tells, once, of a given step in which the fluid moves too far for its extrapolated advection."""
+        longest = self.fluid.longest_step()
+        if dt > longest and not self._told and self.longest_step() == np.inf:
+            self._told = True
+            self.notices.append(
+                f"time.step: at t = {self.time:.4g} the fluid crosses {dt / longest:.2g} cells in a step; advection "
+                f"is extrapolated, stable up to about one: take a step below {longest:.3g}"
+            )
+
+    def _watch(self, before: State) -> None:
+        """Looks for a contact since ``before``, where the case has [contact]."""
+        now = self.state_now
+        told = self.rods.contact.watch(before.shape.r, now.shape.r, before.time, now.time)
+        self.notices += [told] if told else []
+
+    def _fail(self, trouble: failures.Trouble) -> None:
+        message, node, cause, cure = trouble
+        if node is None:
+            raise RunFailed(message, time=self.time, cause=cause, advice=cure)
+        name, local = self.model.rods.locate(node)
+        raise RunFailed(message, time=self.time, filament=name, node=local, cause=cause, advice=cure)
+
+    # -- its speeds ----------------------------------------------------------------------------------------------
+
+    def driving_rates(self) -> list[float]:
+        """How fast the scene is driven, radians per time: by what changes in time, and by what pushes."""
+        return self.cycles + self._pushes
+
+    @cached_property
+    def cycles(self) -> list[float]:
+        """How fast it is driven by what changes in time."""
+        return timescales.cycles(self.model)
+
+    @cached_property
+    def _pushes(self) -> list[float]:
+        return timescales.pushes(self.model)
+
+    def drag(self, filament) -> float:
+        """A drag per length across, for time scales: the case's own in RFT, 4 pi eta on a grid."""
+        return self.model.fluid_model.drag(filament)
+
+    def bending_time(self) -> float:
+        """Relaxation time of the slowest bending mode of any filament."""
+        return timescales.slowest_bending(self.model)
+
+    def thermal_stretch(self, dt: float) -> float:
+        """How much longer than at rest thermal kicks leave a filament on average in steps of dt; the most of all."""
+        return timescales.stretch_by_kicks(self.model, dt)
+
+    def explicit_limit(self) -> float:
+        """The largest stable step of the explicit scheme at the present configuration, 2/rho(M K)."""
+        return explicit_limit(self.mechanics, self.fluid, self.shape, self.time)
+
+    # -- what is looked at ---------------------------------------------------------------------------------------
+
+    def _motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Velocity, force on the fluid and reaction (n, m): of the last step, or of the start."""
+        if self._last is None:
+            force, _ = self.mechanics.forces(self.state_now.shape, self.time)
+            small, dt = 1e-6 * self.case.time.end / 1000, self.step_length
+            index, value = self.mechanics.held(self.time, self.time + small)
+            # Over a whole step at the speeds of this moment: a fluid with inertia resists a sudden start without limit.
+            held = Held(index, value * (dt / small))
+            response = self.fluid.response(self.state_now.shape.r, self.state_now.shape.e3, self.time, dt)
+            answer = response.forced(force, held, np.zeros_like(force))
+            self._last = (answer.move / dt, answer.force, answer.reaction)
+        return self._last
+
+    def frame(self, fields: Sequence[str] = ()) -> Frame:
+        """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
+        now = Instant(self.state_now, *self._motion(), self._iterations, self.shortened)
+        return self._diagnostics.frame(now, fields)
+
+    # -- what must be kept ---------------------------------------------------------------------------------------
+
+    def state(self) -> dict[str, np.ndarray | float | int | str]:
+        """All that is needed to go on bit for bit, also between two outputs."""
+        velocity, force, reaction = self._motion()
+        return {
+            "time": self.time,
+            "steps": self.steps,
+            "iterations": self._iterations,
+            # Whole: measured again from r and e1 it may differ in the last bit (compilers fuse a b + c as they like).
+            "shape": self.state_now.shape.table,
+            "start": self.start.r,
+            "y_old": self.state_now.y_old,
+            "dt_old": self.state_now.dt_old,
+            "velocity": velocity,
+            "force": force,
+            "reaction": reaction,
+            **{f"control_{key}": value for key, value in self._control.state().items()},
+            **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
+            **({} if self.model.noise is None else {"random": self.model.noise.state()}),
+            **self.rods.contact.state(),
+            **({"laws": self._laws} if self._laws else {}),
+        }
+
+    def restore(self, state: dict[str, np.ndarray | float | int | str]) -> None:
+        """Takes up a state that ``state`` gave.
+
+        Raises CaseError where it was made with other laws from Python, or from a start shape that has changed since in
+        the file or run it is read from.
+        """
+        if state.get("laws", "") != self._laws:
+            found, wanted = self._laws or "none", state.get("laws") or "none"
+            raise CaseError([f"{self.case.file}: laws: found {found}; the run began with {wanted}"])
+        array = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
+        number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
+        self._same_start(array["start"])
+        shape = Geometry(array["shape"])
+        self.state_now = State(number["time"], shape, array["y_old"], number["dt_old"])
+        self._last = (array["velocity"], array["force"], array["reaction"])
+        self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
+        control = {k.removeprefix("control_"): v for k, v in (array | number).items() if k.startswith("control_")}
+        self._control.restore(control)
+        memory = {k.removeprefix("fluid_"): v for k, v in (array | number).items() if k.startswith("fluid_")}
+        if memory:
+            self.fluid.recall(memory)
+        if self.model.noise is not None:
+            self.model.noise.restore(str(state["random"]))
+        self.rods.contact.restore(number)
+
+    def _same_start(self, began: np.ndarray) -> None:
+        """Clamps and tethers hold the start shape, so it must be the one the run began with."""
+        for name, where in zip(self.model.rods.names, self.model.rods.nodes, strict=True):
+            moved = float(np.max(np.linalg.norm(self.start.r[where] - began[where], axis=1)))
+            if moved > 1e-9 * self.mechanics.length:  # another machine may differ in the last bits
+                found = f"a start shape that differs by {moved:.3g} from the one the run began with"
+                allowed = "the file or run it is read from, as it was"
+                raise CaseError([f"{self.case.file}: filament.{name}.shape: found {found}; allowed: {allowed}"])

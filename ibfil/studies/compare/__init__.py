@@ -1,0 +1,1 @@
+"""`ibfil compare`: one scene under several fluids."""

@@ -1,0 +1,199 @@
+"""One scene under several fluids, in one table: `ibfil compare`.
+
+The fluids are those of the schema, and two more ways of resistive-force theory: `matched`, with the drag of a straight
+rod dragged through the case's grid, and `slender`. Numbers are means over whole periods after the transient; their
+errors come from the scatter between periods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import CaseError, RunFailed
+from ...io.reader import RunFile
+from ..member import Member, Outcome
+from ..members import run_members
+from ..settings import source
+from ..tables import measured, numbers, write_csv, write_json
+from .fluids import fluid_overrides, known_fluids
+from .quantities import Quantity, Window, quantities
+from .results import Column, Comparison
+
+if TYPE_CHECKING:
+    from ...case.schema import Case
+
+
+TABLE, DETAILS, FIGURE = "compare.csv", "compare.json", "compare.png"
+BLOCKS = 4  # parts of the second half of a run that nothing drives in time
+_SLACK = 1e-3  # of a period: what it may be wrong by, found by sampling what drives
+_TRANSIENT = 1 / 3  # of a run, at least, and a whole period
+
+Say = Callable[[str], object]
+
+
+def _members(case: str, overrides: Sequence[str], fluids: Sequence[str]) -> list[Member]:
+    """A member a fluid, each with its dissipation looked at."""
+    known = known_fluids()
+    faults = [f"--fluids: found {name}; allowed: {', '.join(known)}" for name in fluids if name not in known]
+    if len(set(fluids)) < max(len(fluids), 2):
+        faults.append(f"--fluids: found {', '.join(fluids)}; allowed: two or more, each once")
+    if faults:
+        raise CaseError(faults)
+    whole = source(case)
+    base = Member("case", whole, tuple(overrides)).resolved()
+    seen: tuple[str, ...] = ()
+    if not base.dissipation_observed:
+        first = next(iter(base.filaments))
+        seen = ("observe.dissipation.kind=dissipation", f"observe.dissipation.filament={first}")
+    return [Member(name, whole, (*overrides, *seen, *fluid_overrides(name, base))) for name in fluids]
+
+
+def compare(
+    case: str,
+    fluids: Sequence[str],
+    folder: str | Path,
+    overrides: Sequence[str] = (),
+    *,
+    period: float | None = None,
+    transient: float | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
+    say: Say = print,
+) -> Comparison:
+    """Run the scene under each fluid and write compare.csv, compare.json and compare.png into ``folder``.
+
+    ``period`` is by default the slowest of what drives the scene; where nothing does, the second half of the run is
+    cut into four. ``transient`` is what is left out at the start, by default a third of the run and at least a period.
+    Raises CaseError, RunFailed where no run came to an end, Interrupted.
+    """
+    folder, members = Path(folder), _members(case, overrides, fluids)
+    outcomes = run_members(members, folder, jobs=jobs, executor=executor, say=say)
+    if not any(outcome.done for outcome in outcomes):
+        raise RunFailed("no fluid's run came to an end: " + "; ".join(outcome.message for outcome in outcomes))
+    with ExitStack() as stack:
+        runs = {one.member.name: stack.enter_context(RunFile(one.path)) for one in outcomes if one.done}
+        end = min(float(run.time[-1]) for run in runs.values())
+        window = choose_window(next(iter(runs.values())).case, end, period, transient)
+        own = only_here({name: run.case for name, run in runs.items()})
+        first = next(iter(runs))
+        columns = tuple(_column(one, runs, first, window, own) for one in outcomes)
+        title = next(iter(runs.values())).case.title
+        made = Comparison(title, window, columns, measured())
+        _write(made, folder, runs)
+    return made
+
+
+def _column(
+    outcome: Outcome, runs: Mapping[str, RunFile], first: str, window: Window, own: Mapping[str, tuple[str, ...]]
+) -> Column:
+    from ...check.report import share_lines
+    from ...simulation.simulation import Simulation
+
+    name = outcome.member.name
+    if name not in runs:
+        return Column(name, outcome, "", {}, (), ())
+    run = runs[name]
+    found = quantities(run, window, None if name == first else runs[first])
+    found |= {f"observed: {key}": Quantity(value, None, "") for key, value in _observed(run).items()}
+    seconds, _, covered = run.pace
+    unit = "s" if run.case.units.time == "1" else f"s/{run.case.units.time}"
+    if covered > 0:
+        found["wall time a unit of time"] = Quantity(seconds / covered, None, unit)
+    found["steps"] = Quantity(float(run.steps), None, "1")
+    return Column(name, outcome, run.method, found, own[name], tuple(share_lines(Simulation(run.case))))
+
+
+def _observed(run: RunFile) -> dict[str, float]:
+    """The case's own observables but for the dissipation, which has its rows."""
+    heat = run.case.dissipation_observed
+    return {key: value for key, value in numbers(run).items() if key not in heat}
+
+
+def choose_window(case: Case, end: float, period: float | None, transient: float | None) -> Window:
+    """The whole periods that count. Raises CaseError where not one is left."""
+    if period is None:
+        period = driven_period(case)
+    if period is None:
+        begin = transient if transient is not None else 0.5 * end
+        return Window(end, (end - begin) / BLOCKS, BLOCKS)
+    begin = transient if transient is not None else max(period, _TRANSIENT * end)
+    count = int(np.floor((end - begin) / period + _SLACK))
+    if count < 1:
+        raise CaseError(
+            [
+                f"time.end: found {end:g}; allowed: at least {begin + period:g}, "
+                f"a whole period ({period:g}) after the transient ({begin:g})"
+            ]
+        )
+    return Window(end, period, count)
+
+
+def driven_period(case: Case) -> float | None:
+    """The slowest period of what drives the scene; None where nothing changes in time."""
+    from ...simulation.simulation import Simulation
+
+    cycles = Simulation(case).cycles
+    return 2 * np.pi / min(cycles) if cycles else None
+
+
+def only_here(cases: Mapping[str, Case]) -> dict[str, tuple[str, ...]]:
+    """Return for each fluid what it models that not all of them do."""
+    from ...check.report import modelled
+
+    lines = {name: modelled(case) for name, case in cases.items()}
+    everywhere = set.intersection(*(set(found) for found in lines.values()))
+    return {name: tuple(line for line in found if line not in everywhere) for name, found in lines.items()}
+
+
+def rows(made: Comparison) -> list[dict[str, Any]]:
+    """Return the table: a row a quantity, and for each fluid its value and error."""
+    names = list(dict.fromkeys(key for column in made.columns for key in column.numbers))
+    out = []
+    for name in names:
+        unit = next(column.numbers[name].unit for column in made.columns if name in column.numbers)
+        row: dict[str, Any] = {"quantity": name, "unit": unit}
+        for column in made.columns:
+            found = column.numbers.get(name)
+            row |= {
+                column.fluid: None if found is None else found.value,
+                f"{column.fluid} +-": None if found is None else found.error,
+            }
+        out.append(row)
+    return out
+
+
+def details(made: Comparison) -> dict[str, Any]:
+    """Return everything, ready for JSON."""
+    return {
+        "title": made.title,
+        **made.about,
+        "window": None if made.window is None else asdict(made.window),
+        "fluids": [
+            {
+                "fluid": column.fluid,
+                "status": column.outcome.status,
+                "message": column.outcome.message,
+                "overrides": column.outcome.member.overrides,
+                "method": column.method,
+                "models_alone": column.own,
+                "shares": column.shares,
+                "numbers": {name: asdict(found) for name, found in column.numbers.items()},
+            }
+            for column in made.columns
+        ],
+    }
+
+
+def _write(made: Comparison, folder: Path, runs: Mapping[str, RunFile]) -> None:
+    from .figure import draw
+
+    write_csv(folder / TABLE, rows(made))
+    write_json(folder / DETAILS, details(made))
+    draw(made, runs, folder / FIGURE)

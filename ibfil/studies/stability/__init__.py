@@ -1,0 +1,1 @@
+"""`ibfil stability`: which settings are stable and right."""

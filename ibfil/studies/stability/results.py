@@ -1,0 +1,41 @@
+"""The map of a stability study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..settings import Axis, Setting
+
+if TYPE_CHECKING:
+    pass
+
+
+CLASSES = ("stable", "wrong", "turned", "locked", "stretched", "diverged", "no reference")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One setting: its class, the numbers that made it, and what was predicted ("" for nothing to fear)."""
+
+    setting: Setting
+    kind: str
+    numbers: Mapping[str, float]  # place, shape, turn, stretch, force
+    predicted: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Map:
+    """All cells, in the order of `combinations` of the axes."""
+
+    title: str
+    axes: tuple[Axis, ...]
+    cells: tuple[Cell, ...]
+    about: Mapping[str, Any]
+
+    @property
+    def foretold(self) -> int:
+        """In how many cells prediction and run agree on whether something is amiss."""
+        return sum((cell.kind != "stable") == bool(cell.predicted) for cell in self.cells)

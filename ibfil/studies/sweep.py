@@ -1,0 +1,87 @@
+"""A run for each combination of settings, and one table of all their observables: `ibfil sweep`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import CaseError
+from .member import Outcome
+from .members import run_members, work
+from .settings import Axis, Setting, combinations
+from .tables import measured, numbers, study_members, write_csv, write_json
+
+TABLE, DETAILS = "sweep.csv", "sweep.json"
+
+
+@dataclass(frozen=True)
+class Swept:
+    """One combination, how its run ended, and its observables, empty where there is no result."""
+
+    setting: Setting
+    outcome: Outcome
+    numbers: dict[str, float]
+    about: dict[str, Any]  # steps, wall_time, method
+
+    def row(self) -> dict[str, Any]:
+        """Return its row of the table."""
+        return {
+            "run": self.setting.name,
+            **self.setting.values,
+            "status": self.outcome.status,
+            **self.numbers,
+            **self.about,
+            "message": self.outcome.message,
+        }
+
+
+def sweep(
+    case: str,
+    axes: Sequence[Axis],
+    folder: str | Path,
+    overrides: Sequence[str] = (),
+    *,
+    jobs: int = 1,
+    executor: Executor | None = None,
+    say: Callable[[str], object] = print,
+) -> list[Swept]:
+    """Run every combination that is not done yet, and write ``folder``/sweep.csv and .json (with versions, machine).
+
+    ``case`` is a file, a shipped name or a text, ``overrides`` hold for all. Raises CaseError where the case or
+    all combinations are at fault, and Interrupted as `run_members`.
+    """
+    settings = combinations(axes)
+    outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, say=say)
+    rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
+    table = [row.row() for row in rows]
+    write_csv(Path(folder) / TABLE, table)
+    write_json(Path(folder) / DETAILS, {**measured(), "overrides": list(overrides), "runs": table})
+    return rows
+
+
+def _swept(setting: Setting, outcome: Outcome) -> Swept:
+    from ..io.reader import RunFile
+
+    if not outcome.done:
+        return Swept(setting, outcome, {}, {})
+    with RunFile(outcome.path) as run:
+        about = {"steps": run.steps, "wall_time": run.wall_time, "method": run.method}
+        return Swept(setting, outcome, numbers(run), about)
+
+
+def listing(case: str, axes: Sequence[Axis], overrides: Sequence[str] = ()) -> list[str]:
+    """A line for each combination, with the index that `run_one` takes. Raises CaseError as `sweep`."""
+    members = study_members(case, overrides, combinations(axes))
+    return [f"{index}  {member.name}" for index, member in enumerate(members)]
+
+
+def run_one(case: str, axes: Sequence[Axis], folder: str | Path, index: int, overrides: Sequence[str] = ()) -> Outcome:
+    """Run the combination of that ``index`` alone, as a task of a cluster's array does. Raises CaseError."""
+    members = study_members(case, overrides, combinations(axes))
+    if not 0 <= index < len(members):
+        raise CaseError([f"--index {index}: found no such combination; allowed: 0 to {len(members) - 1}"])
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    return work(members[index], str(folder))

@@ -1,0 +1,116 @@
+"""The members, numbers and tables that studies share, and who measured them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import platform
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import CaseError
+from .member import Member
+from .settings import Setting, source
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..io.reader import RunFile
+
+
+def study_members(case: str, overrides: Sequence[str], settings: Iterable[Setting]) -> list[Member]:
+    """Return a member for each setting of a case.
+
+    Raises CaseError where the case, so overridden, is at fault itself, or with all settings.
+    """
+    whole = source(case)
+    Member("case", whole, tuple(overrides)).resolved()
+    members = [Member(one.name, whole, (*overrides, *one.overrides)) for one in settings]
+    faults: list[str] = []
+    for member in members:
+        try:
+            member.resolved()
+            return members
+        except CaseError as error:
+            faults += error.faults
+    raise CaseError(list(dict.fromkeys(faults)))
+
+
+def observed(run: RunFile) -> dict[str, np.ndarray]:
+    """The number () or vector (3,) of each observable of a run."""
+    import numpy as np
+
+    from ..observables.factory import observers
+    from ..observables.observers import summaries
+
+    observables = observers(run.case).observables
+    series = {name: np.asarray(run.observables[name]) for name in observables}
+    return {name: np.asarray(one.value, float) for name, one in summaries(observables, run.time, series).items()}
+
+
+def numbers(run: RunFile) -> dict[str, float]:
+    """The same with a vector as NAME_x, NAME_y, NAME_z."""
+    out: dict[str, float] = {}
+    for name, value in observed(run).items():
+        if value.ndim:
+            out |= {f"{name}_{letter}": float(part) for letter, part in zip("xyz", value, strict=True)}
+        else:
+            out[name] = float(value)
+    return out
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows under the union of their columns; numbers with all digits, what is not there empty."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    with path.open("w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out)
+        writer.writerow(columns)
+        writer.writerows([_cell(row.get(key)) for key in columns] for row in rows)
+
+
+def _cell(value: Any) -> str:
+    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+
+
+def shown(value: Any, digits: int = 4) -> str:
+    """A cell for the eye."""
+    return f"{value:.{digits}g}" if isinstance(value, float) else "" if value is None else str(value)
+
+
+def write_json(path: Path, told: Mapping[str, Any]) -> None:
+    """Write JSON; what is not finite becomes null."""
+    path.write_text(json.dumps(_finite(told), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
+
+
+def measured() -> dict[str, Any]:
+    """When, with which versions and on what kind of machine something was measured."""
+    from ..io.provenance import versions
+
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "versions": versions(),
+        "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()}; one thread a run",
+    }
+
+
+def _processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        found = re.search(r"^model name\s*:\s*(.+)$", text, re.MULTILINE)
+    except OSError:
+        found = None
+    return found.group(1).strip() if found else platform.machine()

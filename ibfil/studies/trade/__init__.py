@@ -1,0 +1,1 @@
+"""`ibfil trade`: error against the time it takes."""

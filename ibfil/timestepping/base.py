@@ -1,0 +1,96 @@
+"""Time steps: Euler (explicit, linearly implicit, implicit) and BDF2. They know the contract of fluids, and no fluid.
+
+Over a step every scheme is y = target + tau (u0 + M (f(y) + R)) for the displacements y since its start, with M frozen:
+    Euler   target = 0,                             tau = dt
+    BDF2    target = w^2/(1 + 2 w) y_old,           tau = dt (1 + w)/(1 + 2 w),     w = dt/dt_old
+where y_old are the displacements of the step before. The turn of e1 about the tangent is one more component of y,
+measured from the frame carried along (Eq. 41), so it advances to the same order as the positions; the paper's split
+of Eq. 38 is first order whatever the positions do. w = 0 is Euler: the first step, and after any jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..errors import StepFailed
+from ..fluids.base import Answer, Fluid, Response
+from ..linalg.constraints import Held
+from ..rods.geometry import Geometry
+
+
+class State(NamedTuple):
+    """Where the rods are, and the step that led there (y_old (n, m) and dt_old; dt_old = 0 before the first)."""
+
+    time: float
+    shape: Geometry
+    y_old: np.ndarray
+    dt_old: float
+
+
+class Step(NamedTuple):
+    """A finished step: the new state, the nodes' velocities, the force the fluid felt, reactions, iterations.
+
+    ``response`` is the fluid's that it was solved with: what a fluid that remembers is told when the step is taken.
+    """
+
+    state: State
+    velocity: np.ndarray  # (n, m)
+    force: np.ndarray  # (n, m), reactions included
+    reaction: np.ndarray  # (n, m)
+    iterations: int
+    response: Response
+
+
+class Rods(Protocol):
+    """What a stepper asks of the rods."""
+
+    length: float
+
+    def move(self, start: Geometry, y: np.ndarray) -> Geometry:
+        """The configuration displaced by y from ``start``."""
+
+    def turned(self, start: Geometry, y: np.ndarray) -> np.ndarray:
+        """Displacements that turn every segment as y does and do not stretch it."""
+
+    def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Any]:
+        """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""
+
+    def stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float) -> np.ndarray:
+        """The Jacobian of the forces with respect to y, a band matrix by node."""
+
+    def definite_stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float) -> np.ndarray:
+        """The same without compressive geometric stiffness, the part that may make it indefinite."""
+
+    def held(self, before: float, after: float) -> Held:
+        """The prescribed displacements between two times."""
+
+
+Stiffness = Callable[[Geometry, Geometry, Any, float], np.ndarray]  # one of the two of the rods
+
+
+class NotConverged(StepFailed):
+    """Newton's iteration did not converge, least at ``node``."""
+
+
+FAILURES = (StepFailed, np.linalg.LinAlgError)  # of a step: it may be tried again
+
+
+class Stepper(Protocol):
+    """One scheme."""
+
+    @property
+    def order(self) -> int:
+        """Order of accuracy in time."""
+
+    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+        """From ``state`` to ``state.time + dt``. Raises NotConverged."""
+
+
+def _finish(
+    rods: Rods, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Answer, count: int, response
+) -> Step:
+    new = State(state.time + dt, rods.move(state.shape, y), y, dt)
+    return Step(new, velocity, answer.force, answer.reaction, count, response)

@@ -1,0 +1,158 @@
+"""Backward Euler and variable-step BDF2, by Newton's iteration on the exact Jacobian."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..fluids.base import Answer, Fluid, Response
+from ..linalg.constraints import Held
+from ..rods.geometry import Geometry
+from .base import FAILURES, NotConverged, Rods, State, Step, Stiffness, _finish
+
+
+@njit(cache=True)
+def _size(move, length):
+    """The largest displacement in units of the length, or turn in radians; no number where one of them is none."""
+    largest = 0.0
+    for i in range(move.shape[0]):
+        for c in range(move.shape[1]):
+            size = abs(move[i, c]) / (length if c < 3 else 1.0)
+            if size > largest or size != size:
+                largest = size
+    return largest
+
+
+class _Equation(NamedTuple):
+    """What a step has to solve: y = target + tau (u0 + M (f(y) + R)), displacements y from ``start``."""
+
+    rods: Rods
+    response: Response
+    start: Geometry
+    time: float
+    target: np.ndarray  # (n, m)
+    held: Held
+
+    def correction(self, y: np.ndarray, shape: Geometry, stiffness: Stiffness) -> tuple[Answer, float]:
+        """Newton's correction of y, with the exact or the definite ``stiffness`` of the rods, and its size."""
+        force, inner = self.rods.forces(shape, self.time)
+        matrix = stiffness(shape, self.start, inner, self.time)
+        answer = self.response.implicit(force, matrix, self.held, y, self.target)
+        return answer, _size(answer.move, self.rods.length)
+
+
+def _stride(move: np.ndarray, shape: Geometry) -> float:
+    """The largest change of a segment, relative to its length."""
+    joined = shape.gap[:-1].any(axis=1)
+    change = np.linalg.norm(np.diff(move[:, :3], axis=0), axis=1)
+    return float(np.max(change[joined] / shape.length[:-1][joined]))
+
+
+@dataclass(frozen=True)
+class Implicit:
+    """Backward Euler (order 1) or variable-step BDF2 (order 2): Newton on the force, M frozen where the rods will be.
+
+    M is taken at the extrapolated positions. Newton's iteration is tried from three starts, until one converges:
+
+    1. from near the extrapolated positions, for as long as corrections shrink fast. Segments keep their length there:
+       extrapolated ones are stretched by half the square of their turn, against which a stiff rod pulls so hard that
+       the linear answer is far off. The matrix of the iteration before serves again where the fluid keeps its factors
+       and the last correction was small, ``again`` of what it corrected;
+    2. from the start of the step, compressive geometric stiffness left out of the matrix in the first iteration, and
+       in any whose correction would be four times the last one without that;
+    3. as 2, but from the extrapolated positions and with corrections cut so that no segment changes by more than
+       ``stride`` of itself: soft rods of many nodes, whose ends move by more than a segment in a step, need it.
+    """
+
+    order: int = 2
+    tolerance: float = 1e-8  # largest correction of a node: of the length, and in radians of its turn
+    most: int = 12  # iterations, each time
+    stride: float = 0.1  # of a segment
+    again: tuple[float, float] = (0.3, 0.08)  # a first correction of the displacement, others of the one before
+
+    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+        """Newton to ``tolerance``. Raises one of FAILURES, NotConverged after ``most`` iterations among them."""
+        w = dt / state.dt_old if self.order == 2 and state.dt_old > 0 else 0.0
+        tau, target = dt * (1 + w) / (1 + 2 * w), (w * w / (1 + 2 * w)) * state.y_old
+        after, ahead = state.time + dt, w * state.y_old
+        there = rods.move(state.shape, ahead) if w else state.shape
+        equation = _Equation(
+            rods,
+            fluid.response(there.r, there.e3, after, tau, w),
+            state.shape,
+            after,
+            target,
+            rods.held(state.time, after),
+        )
+        y, answer, count = self._solve(equation, ahead, there)
+        return _finish(rods, state, dt, y, (y - target) / tau, answer, count, equation.response)
+
+    def _solve(self, equation: _Equation, ahead: np.ndarray, there: Geometry) -> tuple[np.ndarray, Answer, int]:
+        """Newton from wherever it converges; ``ahead`` are the extrapolated displacements, to ``there``."""
+        if ahead.any():
+            try:
+                y = equation.rods.turned(equation.start, ahead)
+                return self._quickly(equation, y, equation.rods.move(equation.start, y))
+            except FAILURES:
+                pass
+        try:
+            return self._newton(equation, np.zeros(ahead.shape), equation.start, None)
+        except FAILURES:
+            return self._newton(equation, ahead, there, self.stride)
+
+    def _quickly(self, equation: _Equation, y: np.ndarray, shape: Geometry) -> tuple[np.ndarray, Answer, int]:
+        """From y, where the rods have ``shape``, to the solution, while corrections shrink, exact ones to a quarter.
+
+        Where they shrink more slowly another solution may be on the way, as where a soft rod kinks.
+        """
+        rods, last, rate, exact, fresh = equation.rods, _size(y, equation.rods.length), np.inf, 0, False
+        for count in range(1, self.most + 1):
+            force, inner = rods.forces(shape, equation.time)
+            before, fresh = fresh, rate > self.again[count > 2] or not equation.response.keeps
+            if fresh:
+                matrix = rods.stiffness(shape, equation.start, inner, equation.time)
+                exact += 1
+            answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
+            size = _size(answer.move, rods.length)
+            rate = size / max(last, self.tolerance)
+            if not rate < (0.25 if fresh and before else 1.0):
+                break
+            y = y + answer.move
+            # Exact matrices square the error, by a factor that settles after the first; a matrix that serves again
+            # takes the same part of it each time, which it has to show once.
+            known = 10 * rate**2 if exact == count > 2 else 1.0 if before and not fresh else rate
+            coming = size * known if count > 1 else size
+            if coming < self.tolerance:
+                return y, answer, count
+            shape, last = rods.move(equation.start, y), size
+        raise NotConverged(f"corrections do not shrink after {count} iterations", 0)
+
+    def _newton(
+        self, equation: _Equation, y: np.ndarray, shape: Geometry, stride: float | None
+    ) -> tuple[np.ndarray, Answer, int]:
+        """From y, where the rods have ``shape``, to the solution: its y, the last answer, the iterations it took.
+
+        ``stride``: the largest change of a segment by a correction; None: corrections are whole.
+        """
+        rods, exact, last = equation.rods, False, np.inf
+        for count in range(1, self.most + 1):
+            answer, size = equation.correction(y, shape, rods.stiffness if exact else rods.definite_stiffness)
+            if exact and not size <= 4 * last:
+                answer, size = equation.correction(y, shape, rods.definite_stiffness)
+            if not np.isfinite(size):
+                break
+            part = 1.0 if stride is None else min(1.0, stride / max(_stride(answer.move, shape), 1e-300))
+            y = y + part * answer.move
+            # Newton squares the error, so two exact corrections in a row tell the size of the next.
+            coming = size * (size / last) ** 2 if exact and count > 2 else size
+            if part == 1.0 and coming < self.tolerance:
+                return y, answer, count
+            shape, exact, last = rods.move(equation.start, y), True, size
+        worst = int(np.argmax(np.max(np.abs(answer.move), axis=1)))
+        still = f"Newton's correction is still {size:.2g} of the length (allowed {self.tolerance:g})"
+        if not np.isfinite(size):
+            still = "the run diverged: a correction is no finite number"
+        raise NotConverged(f"{still} after {count} iterations", worst)

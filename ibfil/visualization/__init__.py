@@ -1,0 +1,1 @@
+"""Figures, pictures, films and ParaView files of a run."""

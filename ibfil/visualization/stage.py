@@ -1,0 +1,225 @@
+"""The rods and the flow of a run as pixels: pyvista, no display, a fixed camera. Letters are in annotations.py."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.meshes import filament_data
+from .camera import Viewpoint
+from .streamlines import evenly_spaced
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.colors import Colormap
+
+    from ..analysis.run import Run
+
+
+SIDES = 24  # of a tube
+MARGIN = 1.12  # of what the filaments reach
+TIMES = "viridis"  # all eyes can order it
+FLOW = "Greys"
+ARROWS = 26  # along the width of a picture
+SHEET = 160  # points along the width of a slice
+LINES_APART = 7  # of these points, between two streamlines
+
+THIN = 0.012  # of half the picture's height: the radius of tubes of which many are shown at once
+
+
+class Scale(NamedTuple):
+    """A quantity as colour: its array and component of it, what is written at the bar, the map and its ends."""
+
+    name: str
+    label: str
+    colours: str
+    low: float
+    high: float
+
+
+class Frame(NamedTuple):
+    """What the camera sees: half its height, its width over its height, and the unit vector to the right."""
+
+    look: Viewpoint
+    half: float
+    aspect: float
+    right: np.ndarray
+
+    def at(self, across: np.ndarray, up: np.ndarray) -> np.ndarray:
+        """Places (..., 3) in the plane of the picture through its centre."""
+        return self.look.centre + across[..., None] * self.right + up[..., None] * self.look.up
+
+
+def colours(name: str) -> Colormap:
+    """A map of matplotlib's; viridis without its end that is too light on white."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+
+    found = matplotlib.colormaps[name]
+    return ListedColormap(found(np.linspace(0, 0.92, 256))) if name == TIMES else found
+
+
+def frame_for(look: Viewpoint, positions: list[np.ndarray], radius: float, size: tuple[int, int]) -> Frame:
+    """The camera that has all positions (T, N, 3), with tubes of that radius, in a picture of ``size`` pixels."""
+    right = np.cross(look.up, look.towards)
+    every = np.concatenate([p.reshape(-1, 3) for p in positions]) - look.centre
+    aspect = size[0] / size[1]
+    half = max(np.nanmax(np.abs(every @ look.up)), np.nanmax(np.abs(every @ right)) / aspect) + radius
+    return Frame(look, MARGIN * float(half), aspect, right)
+
+
+class Stage:
+    """A plotter that shows one moment after the other."""
+
+    def __init__(self, run: Run, frame: Frame, size: tuple[int, int]) -> None:
+        import pyvista
+
+        self._run, self._frame = run, frame
+        plotter: Any = pyvista.Plotter  # whose types mypy cannot follow
+        self._plotter = plotter(off_screen=True, window_size=list(size), lighting="three lights")
+        self._plotter.set_background("white")
+        self._plotter.enable_anti_aliasing("ssaa")
+        self._plotter.add_axes(color="black", line_width=3, viewport=(0.0, 0.0, 0.14, 0.14 * frame.aspect))
+        camera = self._plotter.camera
+        camera.parallel_projection, camera.parallel_scale = True, frame.half
+        camera.focal_point = frame.look.centre
+        camera.position = frame.look.centre + 10 * frame.look.size * frame.look.towards
+        camera.up = frame.look.up
+        # Behind all rods, so that it hides none of them; seen from afar nothing else changes.
+        self._behind = -2.0 * (frame.look.size + frame.half) * frame.look.towards
+
+    def tubes(self, output: int, scale: Scale) -> None:
+        """The filaments at an output as tubes to scale, coloured by a quantity."""
+        mesh = self._mesh(output)
+        mesh["shown"] = np.asarray(quantity(mesh, scale.name), float)
+        self._add(mesh, scale, "rods")
+
+    def shape(self, output: int, scale: Scale) -> bool:
+        """One of many shapes in the same picture, coloured by its time, later ones in front; whether it is to scale."""
+        mesh = self._mesh(output)
+        mesh["shown"] = np.full(mesh.n_points, self._run.time[output])
+        thin = THIN * self._frame.half
+        to_scale = bool(mesh["tube_radius"].max() <= thin)
+        mesh["tube_radius"] = np.minimum(mesh["tube_radius"], thin)
+        mesh.points += 3 * thin * output * self._frame.look.towards
+        self._add(mesh, scale, f"shape {output}")
+        return to_scale
+
+    def _add(self, mesh: pyvista.PolyData, scale: Scale, name: str) -> None:
+        self._plotter.add_mesh(
+            mesh.tube(scalars="tube_radius", absolute=True, n_sides=SIDES, capping=True),
+            scalars="shown",
+            cmap=colours(scale.colours),
+            clim=(scale.low, scale.high),
+            show_scalar_bar=False,
+            smooth_shading=True,
+            specular=0.2,
+            name=name,
+            reset_camera=False,
+        )
+
+    def _mesh(self, output: int) -> pyvista.PolyData:
+        import pyvista
+
+        return pyvista.wrap(filament_data(self._run, output))
+
+    def slice(self, time: float, fastest: float) -> None:
+        """The speed in the plane of the picture, light to dark."""
+        import pyvista
+
+        across, up, u = self._sample(time, SHEET)
+        places = self._frame.at(across, up) + self._behind
+        sheet = pyvista.StructuredGrid(*(places[..., i][..., None] for i in range(3)))
+        sheet["speed"] = np.linalg.norm(u, axis=-1).ravel(order="F")
+        self._plotter.add_mesh(
+            sheet,
+            scalars="speed",
+            cmap=colours(FLOW),
+            clim=(0.0, fastest),
+            show_scalar_bar=False,
+            lighting=False,
+            name="slice",
+            reset_camera=False,
+        )
+
+    def glyphs(self, time: float, fastest: float) -> None:
+        """Arrows in the plane of the picture, as long as the square root of the speed in it."""
+        import pyvista
+
+        across, up, u = self._sample(time, ARROWS)
+        arrows = pyvista.PolyData((self._frame.at(across, up) + 0.98 * self._behind).reshape(-1, 3))
+        flat = u - (u @ self._frame.look.towards)[..., None] * self._frame.look.towards
+        speed = np.linalg.norm(flat, axis=-1).ravel()
+        arrows["flow"] = flat.reshape(-1, 3)
+        arrows["long"] = np.sqrt(speed / fastest)
+        gap = 2.0 * self._frame.half * self._frame.aspect / ARROWS
+        shape = pyvista.Arrow(tip_radius=0.16, shaft_radius=0.05, tip_length=0.35)
+        shown = arrows.glyph(orient="flow", scale="long", factor=1.6 * gap, geom=shape)
+        self._plotter.add_mesh(shown, color="#303030", lighting=False, name="glyphs", reset_camera=False)
+
+    def streamlines(self, time: float, fastest: float) -> None:
+        """Lines along the flow in the plane of the picture, evenly apart, over the speed there."""
+        import pyvista
+
+        self.slice(time, fastest)
+        across, up, u = self._sample(time, SHEET)
+        x, y = across[:, 0], up[0]
+        gap = LINES_APART * (x[1] - x[0])
+        found = evenly_spaced(x, y, u @ self._frame.right, u @ self._frame.look.up, gap)
+        lines = [self._frame.at(line[:, 0], line[:, 1]) + 0.98 * self._behind for line in found if len(line) > 2]
+        if not lines:
+            return
+        starts = np.cumsum([0, *map(len, lines)])
+        cells = [[len(line), *range(start, start + len(line))] for line, start in zip(lines, starts, strict=False)]
+        drawn = pyvista.PolyData(np.vstack(lines), lines=np.hstack(cells))
+        self._plotter.add_mesh(
+            drawn, color="#505050", line_width=1.5, lighting=False, name="streamlines", reset_camera=False
+        )
+        long = [line for line in lines if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() > 1.5 * gap]
+        middles = [len(line) // 2 for line in long]
+        heads = pyvista.PolyData(np.reshape([line[k] for line, k in zip(long, middles, strict=True)], (-1, 3)))
+        heads["flow"] = np.reshape([line[k] - line[k - 1] for line, k in zip(long, middles, strict=True)], (-1, 3))
+        size = 0.035 * self._frame.half
+        cones = heads.glyph(orient="flow", scale=False, factor=size, geom=pyvista.Cone(radius=0.35, height=1.0))
+        self._plotter.add_mesh(cones, color="#505050", lighting=False, name="heads", reset_camera=False)
+
+    def _sample(self, time: float, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places across and up (n, m) over the picture, and the velocity (n, m, 3) there."""
+        half, aspect = self._frame.half, self._frame.aspect
+        x = np.linspace(-half * aspect, half * aspect, width)
+        y = np.linspace(-half, half, max(2, round(width / aspect)))
+        across, up = np.meshgrid(x, y, indexing="ij")
+        u = self._run.velocity_at(self._frame.at(across, up).reshape(-1, 3), time)
+        return across, up, u.reshape(*across.shape, 3)
+
+    def pixels(self) -> np.ndarray:
+        """The picture (height, width, 3)."""
+        # The camera's range is that of what is there, which each moment changes.
+        self._plotter.renderer.reset_camera_clipping_range()
+        return np.asarray(self._plotter.screenshot(return_img=True))[..., :3]
+
+    def close(self) -> None:
+        """Give the window back."""
+        self._plotter.close()
+
+
+QUANTITIES = {  # what a tube can be coloured by: words, dimension, whether it has a sign
+    "tension": ("tension", "force", True),
+    "moment": ("size of the moment", "force length", False),
+    "curvature": ("curvature", "1/length", False),
+    "twist": ("twist", "1/length", True),
+    "speed": ("speed of the rod", "length/time", False),
+    "force": ("force of a node on the fluid", "force", False),
+    "arclength": ("arclength", "length", False),
+}
+
+
+def quantity(mesh: pyvista.PolyData, name: str) -> np.ndarray:
+    """The values (n,) at the nodes of one of QUANTITIES."""
+    if name == "curvature":
+        return np.linalg.norm(mesh["strain"][:, :2], axis=1)
+    if name == "twist":
+        return np.asarray(mesh["strain"][:, 2])
+    values = np.asarray(mesh["velocity" if name == "speed" else name])
+    return np.linalg.norm(values, axis=1) if values.ndim == 2 else values

@@ -1,0 +1,50 @@
+"""What all figures have in common: style, colours and marks, labels with units, the plane that is drawn, files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+AXES = "xyz"
+# Okabe and Ito: told apart by all eyes; with them the marks, for prints without colour.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKS = "osD^vPX"
+STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.4,
+}
+
+
+def with_units(name: str, units: str) -> str:
+    """A label for an axis: the name, and its units where it has any."""
+    return f"{name} ({units})" if units not in ("", "1") else name
+
+
+def plane_of_motion(positions: Sequence[np.ndarray]) -> tuple[int, int]:
+    """The two lab axes, in order, along which the filaments (T, N, 3) reach farthest."""
+    low = np.min([p.min(axis=(0, 1)) for p in positions], axis=0)
+    high = np.max([p.max(axis=(0, 1)) for p in positions], axis=0)
+    reach = high - low
+    # The first of equally short axes counts from z: a straight rod along x is seen in x-y.
+    dropped = 2 - int(np.argmin(reach[::-1]))
+    a, b = (axis for axis in range(3) if axis != dropped)
+    return a, b
+
+
+def save(fig: Figure, path: Path) -> None:
+    """Write a figure as a picture, and beside it as PDF, for papers."""
+    fig.savefig(path, dpi=170)
+    fig.savefig(path.with_suffix(".pdf"))

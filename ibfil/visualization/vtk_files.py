@@ -1,0 +1,155 @@
+"""A run as ParaView files.
+
+One .pvd collection with the real times, a .vtp of all filaments for each output, a .vti for each grid field time, where
+there are both a .pvd of either alone, and a ready scene (paraview_scene.py).
+
+Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
+file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
+change are left alone, and numbers follow the run's outputs, so that writing a run again after it has been resumed
+extends the collection and never doubles a time.
+"""
+
+from __future__ import annotations
+
+import bisect
+import filecmp
+import os
+import time as clock
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..analysis.meshes import PLAIN, View, box_of, field_data, polylines, rods_of
+from ..errors import CaseError
+from ..io.reader import RunFile
+from .paraview_scene import write_scene
+
+if TYPE_CHECKING:
+    from vtkmodules.vtkCommonDataModel import vtkDataSet
+
+
+Entries = list[tuple[float, str]]  # time and file
+
+
+def write_vtk(
+    run: str | Path,
+    folder: str | Path | None = None,
+    *,
+    wrap: bool = False,
+    images: int = 0,
+    watch: float | None = None,
+    log: Callable[[str], object] = print,
+) -> Path:
+    """Write the run file ``run`` into ``folder``, by default the run's name; returns the path of the .pvd.
+
+    ``wrap`` brings filaments into the periodic box, cut at its faces; ``images`` adds their periodic images in so many
+    boxes on each side. With ``watch`` it goes on, looking every so many seconds, until the run is no longer running. A
+    time at which only filaments or only fields were put out shows the last of the other before it, which is what
+    ParaView itself does with two sources. Raises what `ibfil.open` raises for a file that is no run, CaseError where
+    wrapping or images are asked of a run without a box, OSError where a file cannot be written.
+    """
+    run = Path(run)
+    collection = Collection(run, run.with_suffix("") if folder is None else Path(folder), View(wrap, images))
+    going_on = collection.update()
+    while watch is not None and going_on:
+        before = len(collection.filaments)
+        clock.sleep(watch)
+        going_on = collection.update()
+        if len(collection.filaments) != before:
+            log(f"{collection.path}: {len(collection.filaments)} times, until t = {collection.filaments[-1][0]:.6g}")
+    return collection.path
+
+
+class Collection:
+    """The .pvd of a run and the files it names. ``update`` writes what is new in the run."""
+
+    def __init__(self, run: Path, folder: Path, view: View = PLAIN) -> None:
+        self.run, self.folder, self.view = run, folder, view
+        self.path = folder / f"{run.stem}.pvd"
+        self.filaments: Entries = []
+        self.fields: Entries = []
+        self._created = ""
+
+    def update(self) -> bool:
+        """Have every output of the run so far in the collection; whether the run is still running."""
+        with RunFile(self.run) as run:
+            if self.view != PLAIN and box_of(run) is None:
+                allowed = "a run on a grid; rft has no periodic box"
+                raise CaseError([f"{self.run}: found --wrap or --images; allowed: {allowed}"])
+            if run.created != self._created:
+                self.filaments, self.fields, self._created = [], [], run.created
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._add_filaments(run)
+            self._add_fields(run)
+            _write_collection(self.path, [self.filaments, self.fields])
+            if self.fields:  # each kind alone too: filters of lines, such as Tube, may crash ParaView upon a grid
+                _write_collection(self._alone("filaments"), [self.filaments])
+                _write_collection(self._alone("grid"), [self.fields])
+            write_scene(self.path, run)
+            return run.status == "running"
+
+    def _alone(self, kind: str) -> Path:
+        return self.path.with_stem(f"{self.path.stem}_{kind}")
+
+    def _add_filaments(self, run: RunFile) -> None:
+        """A .vtp for each output that is not there yet."""
+        _keep_common(self.filaments, run.time)
+        rods, box = rods_of(run), box_of(run)
+        done = len(self.filaments)
+        for i, frame in enumerate(run.frames(done), done):
+            file = f"{self.run.stem}_filaments_{i:06d}.vtp"
+            _save(polylines(frame, rods, box, self.view), self.folder / file)
+            self.filaments.append((frame.time, file))
+
+    def _add_fields(self, run: RunFile) -> None:
+        """A .vti for each time at which fields were put out."""
+        times = np.empty(0) if run.grid is None else np.asarray(run.grid.time)
+        _keep_common(self.fields, times)
+        for i in range(len(self.fields), len(times)):
+            file = f"{self.run.stem}_grid_{i:06d}.vti"
+            _save(field_data(run, i), self.folder / file)
+            self.fields.append((float(times[i]), file))
+
+
+def _keep_common(entries: Entries, times: np.ndarray) -> None:
+    """Forget what a run that was cut back to its checkpoint put out at other times since."""
+    same = [time == now for (time, _), now in zip(entries, times, strict=False)]
+    del entries[same.index(False) if False in same else len(same) :]
+
+
+def _save(data: vtkDataSet, path: Path) -> None:
+    """Write one dataset by a temporary name; a file that holds the same bytes already is left untouched."""
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter() if path.suffix == ".vtp" else vtkXMLImageDataWriter()
+    temporary = path.with_name(path.name + ".part")
+    writer.SetFileName(str(temporary))
+    writer.SetInputData(data)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetHeaderTypeToUInt64()
+    writer.SetCompressorTypeToNone()
+    if not writer.Write():
+        temporary.unlink(missing_ok=True)
+        raise OSError(f"{path}: could not be written; is the disk full?")
+    if path.exists() and filecmp.cmp(temporary, path, shallow=False):
+        temporary.unlink()
+    else:
+        os.replace(temporary, path)
+
+
+def _write_collection(path: Path, sources: Sequence[Entries]) -> None:
+    """The .pvd: at every time of any source, the file of each source that is the last at or before it."""
+    lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="1.0">', "<Collection>"]
+    for time in sorted({t for source in sources for t, _ in source}):
+        for part, source in enumerate(sources):
+            last = bisect.bisect_right(source, time, key=lambda entry: entry[0]) - 1
+            if last >= 0:
+                lines.append(f'<DataSet timestep="{time!r}" part="{part}" file={quoteattr(source[last][1])}/>')
+    lines += ["</Collection>", "</VTKFile>", ""]
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text("\n".join(lines), encoding="utf-8")
+    os.replace(temporary, path)

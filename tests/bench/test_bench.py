@@ -1,0 +1,64 @@
+"""The benchmark's pieces run and give numbers; how fast they are is never tested."""
+
+import json
+import math
+import subprocess
+import sys
+
+import pytest
+
+from ibfil.bench import many, parts, pieces, timing
+from ibfil.errors import CaseError
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        lambda: [pieces.rft_step(16)],
+        lambda: pieces.evaluations(16, (1.1, 0.5)),
+        lambda: [pieces.table_pair("roma3", 1.0, 5)],
+        lambda: [pieces.inertia(16)],
+        lambda: pieces.swimmers(end=1e-3),
+    ],
+)
+def test_pieces_give_finite_positive_numbers(rows, monkeypatch):
+    monkeypatch.setattr(timing, "_TURNS", 2)
+    monkeypatch.setattr(timing, "_TOTAL", 0.0)
+    for row in rows():
+        assert math.isfinite(row.ratio)
+        assert min(row.seconds, row.floor_seconds, row.ratio) > 0
+        assert row.verdict in ("", "ok", "over")
+        assert row.piece in timing.table([row])
+
+
+def test_the_verdict_follows_the_bar():
+    assert timing.Row("a", 2.0, "b", 1.0, 2.0, 1.9).verdict == "over"
+    assert timing.Row("a", 2.0, "b", 1.0, 2.0, 2.1).verdict == "ok"
+    assert timing.Row("a", 2.0, "b", 1.0, 2.0, None).verdict == ""
+
+
+def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monkeypatch):
+    told = {"seconds": 2e-6, "told": 3e8, "peak": 2.9e8, "products": 40.0, "halved": 0, "method": "krylov"}
+    monkeypatch.setattr(many, "measured", lambda *scene: told)
+    rows = parts.many(cells=(16,), steps=1)
+    assert [row.bar for row in rows] == [3.0, 1.0, None] * 2
+    assert rows[2].ratio == 2.9e8 / 3e8
+    asked = [sys.executable, "-m", "ibfil.bench.many", "2", "8", "16", "1"]
+    found = json.loads(subprocess.run(asked, capture_output=True, check=True, text=True).stdout)
+    assert 0 < found["seconds"] < found["peak"]
+    assert found["method"] == "table"
+
+
+def test_a_part_there_is_not_is_refused():
+    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, swimmer"):
+        parts.main(parts=["pieces", "nope"])
+
+
+def test_json_is_json(monkeypatch, capsys):
+    row = timing.Row("a", 2.0, "b", 1.0, 2.0, None)
+    for name in ("rft_step", "table_pair", "inertia", "start_up"):
+        monkeypatch.setattr(pieces, name, lambda *_, **__: row)
+    monkeypatch.setattr(pieces, "evaluations", lambda *a: [row])
+    monkeypatch.setattr(pieces, "swimmers", lambda: [row])
+    assert parts.main(json=True) == 0
+    assert json.loads(capsys.readouterr().out)[0]["ratio"] == 2.0

@@ -1,0 +1,61 @@
+"""What in a scene makes its user look twice: a sentence each, and none where nothing is amiss."""
+
+from __future__ import annotations
+
+import pytest
+
+from ibfil import parse_case
+from ibfil.check.warnings import warnings
+from ibfil.simulation.simulation import Simulation
+
+SCENE = """
+[filament.rod]
+length = 1.0
+nodes = 33
+bending = 1.0
+stretching = 100
+loads = { weight = [0, 0, -1] }
+[fluid]
+model = "stokes"
+viscosity = 1.0
+box = [2, 2, 2]
+cells = [64, 64, 64]
+[time]
+end = 0.1
+step = 0.01
+[output]
+every = 0.1
+"""
+FORCE = "fluid.box: the rods push the fluid with a net force"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ([], ""),
+        (["filament.rod.nodes=14"], ""),  # 2.46 cells apart
+        (["filament.rod.nodes=13"], "filament.rod: nodes are 2.7 cells apart: beyond 2.5"),
+        (["fluid.cells=[12, 12, 12]"], ""),  # a/L = 0.184
+        (["fluid.cells=[10, 10, 10]"], "filament.rod: a/L = 0.22: on this grid"),
+        (["fluid.slip=0"], ""),
+        (["fluid.slip=0", "filament.rod.nodes=65"], "filament.rod: nodes are 0.5 cells apart and fluid.slip = 0"),
+        (["output.every=0.2"], "output.every: 0.2 is beyond time.end = 0.1"),
+        (["fluid.model=rft", "filament.rod.radius=0.3"], ""),  # a grid's matter
+        (["filament.rod.start={end='hinged', moves=['0.1*sin(t)', 0, '0.1*t']}", "time.step=1e-3"], ""),
+        (
+            ["filament.rod.start={end='hinged', moves=['0.1*cos(t)', 0, 0]}", "time.step=1e-3"],
+            "filament.rod.start.moves: [0.1, 0.0, 0.0]",
+        ),
+    ],
+)
+def test_warnings(changes, said):
+    told = warnings(Simulation(parse_case(SCENE, "s.toml", changes)))
+    others = [line for line in told if not line.startswith(FORCE)]
+    assert len(others) == bool(said), told
+    assert all(line.startswith(said) for line in others), told
+
+
+def test_a_back_pressure_that_is_a_rounding_error_is_zero():
+    (line,) = warnings(Simulation(parse_case(SCENE, "s.toml", ["filament.rod.direction=[1, 0.3, 0]"])))
+    assert line.startswith(FORCE)
+    assert "(0, 0, -0.125)" in line

@@ -1,0 +1,220 @@
+"""Many nodes: Krylov on the FFT operator against the dense path, its residual, its memory; copies of a filament."""
+
+import numpy as np
+import pytest
+from helpers.scenes import swimmer
+
+from ibfil.case.reading import parse_case
+from ibfil.check.budget import memory
+from ibfil.errors import CaseError
+from ibfil.fluids import preconditioner
+from ibfil.fluids.condensation import Newton, NothingCondensed, TwistCondensed
+from ibfil.linalg import gmres
+from ibfil.linalg.constraints import Held
+from ibfil.simulation.simulation import Simulation
+
+MANY = """
+[filament.rod]
+length = 0.5
+nodes = {nodes}
+bending = [1, 0.6]
+{twisting}
+stretching = 1e3
+curvature = ["6*sin(4*pi*s - 10*t)", 0]
+shape = {{ kind = "relaxed" }}
+copies = {{ count = {count}, seed = 5, region = [[-0.8, -0.8, -0.8], [0.8, 0.8, 0.8]] }}
+{start}
+[fluid]
+model = "stokes"
+viscosity = 1.3
+box = [3.2, 3.2, 3.2]
+cells = [32, 32, 32]
+method = "{method}"
+[time]
+end = 0.06
+step = 0.01
+[output]
+every = 0.06
+"""
+TWIST = "twisting = 0.7\nradius = 0.02"
+CLAMP = 'start = { end = "clamped", spin = 3.0 }'
+
+
+def _simulation(method, count=3, nodes=12, twisting="", start=""):
+    return Simulation(
+        parse_case(MANY.format(method=method, count=count, nodes=nodes, twisting=twisting, start=start), "many.toml")
+    )
+
+
+def _run(simulation):
+    simulation.advance(0.06, lambda: None)
+    return simulation.frame()
+
+
+@pytest.mark.parametrize(("twisting", "start"), [("", ""), (TWIST, ""), (TWIST, CLAMP)])
+def test_krylov_is_the_dense_path_on_three_filaments(twisting, start):
+    dense = _run(_simulation("table", twisting=twisting, start=start))
+    gmres = _run(_simulation("krylov", twisting=twisting, start=start))
+    assert list(dense.filaments) == ["rod_000", "rod_001", "rod_002"]
+    for name, one in dense.filaments.items():
+        other = gmres.filaments[name]
+        assert np.abs(one.position - other.position).max() < 6 * 1e-8 * 0.5  # six steps, each to Newton's tolerance
+        assert np.abs(one.e1 - other.e1).max() < 1e-7
+        assert np.abs(one.force - other.force).max() < 1e-5 * np.abs(one.force).max()
+        if start:
+            size = np.linalg.norm(one.reaction_start)
+            assert np.linalg.norm(one.reaction_start - other.reaction_start) < 1e-5 * size
+
+
+def test_residual_of_a_step_with_2000_nodes():
+    """y = target + tau M F at every node, with the velocity of the FFT operator."""
+    simulation = _simulation("krylov", 40, 50)
+    start = simulation.shape.r.copy()
+    simulation.advance(0.01, lambda: None)  # one step of Euler, M frozen at the start
+    move = simulation.shape.r - start
+    force = simulation.state()["force"]
+    fluid = simulation.fluid
+    base, weights = fluid.immersed.stencil(start)
+    u = fluid.solver.velocity(base, weights, np.ascontiguousarray(force)) + fluid.immersed.slip[:, None] * force
+    assert np.abs(move - 0.01 * u).max() < 1e-6 * np.abs(move).max()
+
+
+def test_the_kept_preconditioner_goes_into_the_state_and_comes_back():
+    whole, cut = _simulation("krylov", twisting=TWIST), _simulation("krylov", twisting=TWIST)
+    cut.advance(0.03, lambda: None)
+    again = _simulation("krylov", twisting=TWIST)
+    again.restore(cut.state())
+    whole.advance(0.03, lambda: None)
+    for simulation in (whole, again):
+        simulation.advance(0.06, lambda: None)
+    assert np.array_equal(whole.shape.r, again.shape.r)
+    assert np.array_equal(whole.shape.e1, again.shape.e1)
+
+
+def test_memory_of_ten_thousand_nodes_is_told_and_below_two_gibibytes():
+    """200 x 50 and 20 x 500 at 128^3, from counts; nothing is run."""
+    for count, nodes in ((200, 50), (20, 500)):
+        simulation = _simulation("krylov", count, nodes)
+        simulation.grid.cells = np.array([128, 128, 128])
+        assert sum(memory(simulation).values()) < 2 * 2**30
+
+
+def test_auto_takes_krylov_where_the_table_costs_more():
+    assert _simulation("auto", 2, 12).method == "table"
+    assert _simulation("auto", 60, 20).method == "krylov"
+
+
+def test_copies_are_the_same_filament_turned_and_moved():
+    simulation = _simulation("table", 4)
+    frame = simulation.frame()
+    one = frame.filaments["rod_000"].position
+    distances = np.linalg.norm(one[:, None] - one[None], axis=2)
+    for filament in frame.filaments.values():
+        r = filament.position
+        assert np.allclose(np.linalg.norm(r[:, None] - r[None], axis=2), distances, atol=1e-13)
+        middle = r[np.array([5, 6])].mean(axis=0)
+        assert np.all(np.abs(middle) < 0.9)
+    turns = [np.linalg.norm(f.position[-1] - f.position[0] - (one[-1] - one[0])) for f in frame.filaments.values()]
+    assert min(turns[1:]) > 0.05  # turned, each its own way
+    again = _simulation("table", 4).frame()
+    assert np.array_equal(again.filaments["rod_003"].position, frame.filaments["rod_003"].position)
+
+
+def test_copies_from_a_file(tmp_path):
+    (tmp_path / "places.csv").write_text("0.5, 0, 0, 0, 0, 0, 1\n-0.5, 0.25, 0, 0, 0, 1, 0\n")
+    text = MANY.format(method="table", count=1, nodes=12, twisting="", start="")
+    text = text.replace(text.split("copies = ")[1].split("\n")[0], '{ file = "places.csv" }')
+    case = parse_case(text, str(tmp_path / "many.toml"))
+    a, b = (f.position for f in Simulation(case).frame().filaments.values())
+    assert np.allclose((a - [0.5, 0, 0]) * [-1, -1, 1], b - [-0.5, 0.25, 0], atol=1e-14)  # half a turn about z
+    (tmp_path / "places.csv").write_text("1, 2\n")
+    with pytest.raises(CaseError, match=r"copies\.file"):
+        Simulation(case)
+
+
+def test_thickness_chooses_the_grid():
+    text = MANY.format(method="table", count=1, nodes=12, twisting="", start="")
+    got = Simulation(parse_case(text.replace("cells = [32, 32, 32]", "thickness = 0.1105"), "t.toml"))
+    assert got.grid.cells.tolist() == [32, 32, 32]
+    got = Simulation(parse_case(text.replace("cells = [32, 32, 32]", "thickness = 0.11"), "t.toml"))
+    assert got.grid.cells.tolist() == [36, 36, 36]
+    odd = text.replace("cells = [32, 32, 32]", "thickness = 0.1105").replace("3.2, 3.2, 3.2", "3.2, 3.2, 3.7")
+    with pytest.raises(CaseError, match=r"fluid\.thickness.*box = "):
+        Simulation(parse_case(odd, "t.toml"))
+
+
+def test_a_stiff_rod_of_many_nodes_is_not_given_up_for_rounding():
+    """200 nodes a tenth of a cell apart, EA = 50: by these paths steps were halved where the table needs none."""
+    paths = {}
+    for method in ("table", "krylov", "fft"):
+        fluid = {"model": "stokes", "box": [1.4] * 3, "cells": [28] * 3, "slip": 0.01, "method": method}
+        simulation = Simulation(swimmer(fluid, stretching=50.0, end=0.06, step=0.03, rod={"nodes": 200}))
+        simulation.advance(0.06, lambda: None)
+        assert simulation.shortened == 0
+        paths[method] = simulation.shape.r
+    for method in ("krylov", "fft"):
+        assert np.abs(paths[method] - paths["table"]).max() < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("unknowns", "condensation"),
+    [(3, NothingCondensed()), (4, NothingCondensed()), (4, TwistCondensed(np.linspace(1.0, 2.0, 24)))],
+    ids=["plain", "twist on the grid", "twist condensed"],
+)
+def test_the_system_of_rods_is_their_statement(unknowns, condensation):
+    """1 - tau M K by its matrix, and by the products that the FFTs are given; two rods, and each of them alone."""
+    rng, n, tau = np.random.default_rng(1), 24, 0.3
+    rods = slice(0, 14), slice(14, n)
+    band = rng.standard_normal((n, unknowns, 7 * unknowns))
+    for i, a in np.ndindex(n, 7):
+        if not any(rod.start <= i < rod.stop and rod.start <= i + a - 3 < rod.stop for rod in rods):
+            band[i, :, a * unknowns : (a + 1) * unknowns] = 0.0
+    parts = np.array([0, 2, 5 * unknowns + 1, 15 * unknowns + unknowns - 1, 20 * unknowns])
+    zero = np.zeros((n, unknowns))
+    statement = condensation.reduced(Newton(zero, band, Held(parts, np.zeros(5)), zero, zero, tau))
+    c = statement.force.size // n
+    for rod in (slice(0, n), *rods):
+        within = slice(c * rod.start, c * rod.stop)
+        mobility = np.zeros((c * n, c * n))
+        half = rng.standard_normal((c * (rod.stop - rod.start),) * 2)
+        mobility[within, within] = half + half.T
+        x = np.zeros(c * n)
+        x[within] = rng.standard_normal(within.stop - within.start)
+        pushed = statement.times(statement.free * x)
+        pushed[statement.index] += x[statement.index]
+        expected = (statement.free * x - tau * mobility @ pushed)[within]
+        system = statement.frozen().system(rod, np.ascontiguousarray(mobility[within, within]), tau)
+        assert np.allclose(system.T @ x[within], expected, rtol=0, atol=1e-10)
+        assert np.allclose(gmres.factor(system.copy()).solve(expected), x[within], rtol=0, atol=1e-8)
+
+
+def _rounds(kept, products):
+    """For each round of solves, of so many products, whether the factors are made anew after it."""
+    made = []
+    for count in products:
+        kept.now += count
+        made.append(kept.end_round())
+        if made[-1]:
+            kept.renew(gmres.Blocks([], np.ones(0)), 1.0)
+    return made
+
+
+def test_a_preconditioner_is_kept_while_that_is_cheaper_than_the_mean():
+    kept = preconditioner.KeptFactors(100.0)
+    kept.renew(gmres.Blocks([], np.ones(0)), 1.0)
+    assert kept.fits(0.8)
+    assert not kept.fits(0.5)
+    # (100 + 10)/1, (100 + 30)/2 = 65, (100 + 80)/3 = 60 < 90: the fourth round was one too many
+    assert _rounds(kept, [10, 20, 50, 90]) == [False, False, False, True]
+    # remembered: three rounds from now on
+    assert _rounds(kept, [10, 20, 50, 10, 20, 50]) == [False, False, True] * 2
+
+
+def test_a_preconditioner_that_serves_once_is_made_each_round_but_for_a_trial():
+    kept = preconditioner.KeptFactors(5.0)
+    kept.renew(gmres.Blocks([], np.ones(0)), 1.0)
+    made = []
+    for _ in range(12):
+        made += _rounds(kept, [40 if not made or made[-1] else 60])
+    assert made[:3] == [False, True, True]
+    assert made.count(False) == 2  # the trials

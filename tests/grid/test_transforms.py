@@ -1,0 +1,182 @@
+"""FFTs by FFTW, and its plans remembered as wisdom."""
+
+from __future__ import annotations
+
+import base64
+import json
+
+import numpy as np
+import pyfftw
+import pytest
+
+from ibfil.grid import fft
+from ibfil.grid.fft import VectorTransform
+
+CELLS = (10, 9, 14)
+
+
+@pytest.fixture(autouse=True)
+def _own_plans(tmp_path, monkeypatch):
+    """A cache folder of this test's own, and no plans from elsewhere; those of before come back after it."""
+    before = pyfftw.export_wisdom()
+    pyfftw.forget_wisdom()
+    monkeypatch.setattr("platformdirs.user_cache_path", lambda name: tmp_path / "cache" / name)
+    yield
+    pyfftw.forget_wisdom()
+    pyfftw.import_wisdom(before)
+
+
+def known(cells: tuple[int, int, int]) -> bool:
+    """Whether FFTW has a measured plan of this transform."""
+    real = pyfftw.empty_aligned(cells)
+    modes = pyfftw.empty_aligned((*cells[:2], cells[2] // 2 + 1), dtype=complex)
+    try:
+        pyfftw.FFTW(real, modes, axes=(0, 1, 2), flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
+    except RuntimeError:
+        return False
+    return True
+
+
+def plans(text: str) -> list[list[bytes]]:
+    """The plans in a text; FFTW writes them in no order."""
+    return [sorted(base64.b64decode(part).splitlines()) for part in json.loads(text)]
+
+
+# --- transforms ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cells", [(8, 8, 8), (10, 9, 14), (5, 12, 7)])
+@pytest.mark.parametrize("planning", ["FFTW_ESTIMATE", "FFTW_MEASURE"])
+def test_transforms_are_those_of_numpy(cells, planning):
+    transform = VectorTransform(cells, planning=planning)
+    field = np.random.default_rng(0).standard_normal((3, *cells))
+    assert not transform.real.any()
+    transform.real[:] = field
+    modes = transform.forward()
+    expected = np.fft.rfftn(field, axes=(1, 2, 3))
+    assert np.abs(modes - expected).max() < 1e-14 * np.abs(expected).max() * 10
+    assert np.array_equal(transform.real, field)
+    back = transform.backward()
+    assert back is transform.real
+    assert transform.size == np.prod(cells)
+    assert np.abs(back / transform.size - field).max() < 1e-14
+
+
+def test_two_threads_give_the_same_numbers():
+    field = np.random.default_rng(1).standard_normal((3, *CELLS))
+    modes = []
+    for threads in (1, 2):
+        transform = VectorTransform(CELLS, threads, "FFTW_ESTIMATE")
+        transform.real[:] = field
+        modes.append(transform.forward().copy())
+    assert np.abs(modes[0] - modes[1]).max() < 1e-14 * np.abs(modes[0]).max() * 10
+
+
+# --- wisdom ----------------------------------------------------------------------------------------------------------
+
+
+def test_wisdom_of_a_run_file_comes_back():
+    VectorTransform(CELLS)
+    text = fft.wisdom()
+    assert "\n" not in text
+    pyfftw.forget_wisdom()
+    assert not known(CELLS)
+    fft.learn(text)
+    assert known(CELLS)
+    assert plans(fft.wisdom()) == plans(text)
+
+
+def test_plans_are_remembered_between_runs_in_the_users_cache():
+    VectorTransform(CELLS)
+    fft.remember()
+    file = fft.wisdom_file()
+    assert [p.name for p in file.parent.iterdir()] == [file.name]  # the partial file is gone
+    pyfftw.forget_wisdom()
+    fft.learn()
+    assert known(CELLS)
+
+
+def test_wisdom_given_is_taken_and_the_cache_is_not():
+    VectorTransform((6, 6, 6))
+    given = fft.wisdom()
+    VectorTransform(CELLS)
+    fft.remember()
+    pyfftw.forget_wisdom()
+    fft.learn(given)
+    assert known((6, 6, 6))
+    assert not known(CELLS)
+
+
+def test_no_cache_is_no_fault():
+    assert not fft.wisdom_file().exists()
+    fft.learn()
+    assert not known(CELLS)
+
+
+def whole() -> str:
+    VectorTransform(CELLS)
+    return fft.wisdom()
+
+
+DAMAGED = {
+    "empty": b"",
+    "not JSON": b"wisdom?",
+    "a number": b"5",
+    "a table": b'{"a": 1}',
+    "null": b"null",
+    "not base64": b'["!!", "??", "##"]',
+    "not ASCII": '["ä", "ö", "ü"]'.encode(),
+    "not text": b"\xff\xfe\x00\x9d",
+    "too few": b'["aa=="]',
+    "too many": b'["YQ==", "YQ==", "YQ==", "YQ=="]',
+    "numbers": b"[1, 2, 3]",
+    "another's words": json.dumps([base64.b64encode(b"(fftw-3.3 (x))").decode()] * 3).encode(),
+    "zeros": json.dumps([base64.b64encode(bytes(40)).decode()] * 3).encode(),
+    "nested": b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("content", DAMAGED.values(), ids=DAMAGED)
+def test_a_damaged_cache_costs_planning_time_and_nothing_else(content):
+    file = fft.wisdom_file()
+    file.parent.mkdir(parents=True)
+    file.write_bytes(content)
+    fft.learn()
+    VectorTransform(CELLS)
+    fft.remember()  # and the damage is mended
+    pyfftw.forget_wisdom()
+    fft.learn()
+    assert known(CELLS)
+
+
+@pytest.mark.parametrize("cut", [0.3, 0.6, 0.95])
+def test_a_cache_cut_short_is_no_fault(cut):
+    text = whole()
+    file = fft.wisdom_file()
+    file.parent.mkdir(parents=True)
+    file.write_text(text[: int(cut * len(text))])
+    fft.learn()
+    words = [base64.b64decode(part) for part in json.loads(text)]
+    file.write_text(json.dumps([base64.b64encode(w[: int(cut * len(w))]).decode() for w in words]))
+    fft.learn()
+
+
+@pytest.mark.parametrize("where", ["cache", "cache/ibfil"])
+def test_a_cache_folder_that_cannot_be_made_is_no_fault(tmp_path, where):
+    file = tmp_path / where  # a file where a folder should be: no user, not even root, can write below it
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("in the way")
+    fft.learn()
+    VectorTransform(CELLS)
+    fft.remember()
+    assert file.read_text() == "in the way"
+
+
+def test_a_cache_that_cannot_be_replaced_is_no_fault_and_leaves_nothing_behind():
+    VectorTransform(CELLS)
+    file = fft.wisdom_file()
+    file.mkdir(parents=True)  # a folder where the file should be
+    fft.remember()
+    assert file.is_dir()
+    fft.learn()
+    assert [p.name for p in file.parent.iterdir()] == [file.name]

@@ -1,0 +1,68 @@
+"""Where a start shape is put: anchor, direction, align and normal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.shape_scene import ARC, SPATIAL, X, Z, fault, rod
+
+from ibfil.shapes.initial import end_tangents, initial_shape
+
+
+def test_anchor_stands_at_position() -> None:
+    place = np.array([0.3, -0.2, 0.5])
+    keys = {"nodes": 40, "position": place.tolist(), "shape": ARC}  # no node at s = L/2
+    r, _ = initial_shape(rod(anchor="start", **keys))
+    np.testing.assert_allclose(r[0], place, atol=1e-16)
+    r, _ = initial_shape(rod(anchor="middle", **keys))
+    # The middle of the arc lies (1 - cos 1)/2, its sagitta, to the right of the middle of the chord.
+    chord = r[-1] - r[0]
+    across = np.cross(chord, Z) / np.linalg.norm(chord)
+    sagitta = 0.5 * (1.0 - np.cos(1.0))
+    np.testing.assert_allclose(place, 0.5 * (r[0] + r[-1]) + sagitta * across, atol=1e-14)
+    r, _ = initial_shape(rod(anchor="centroid", **keys))
+    np.testing.assert_allclose((0.5 * (r[1:] + r[:-1])).mean(axis=0), place, atol=1e-15)
+
+
+def test_align_points_the_chord_or_the_tangent() -> None:
+    direction = np.array([1.0, 2.0, 2.0]) / 3.0
+    for align, shape in (("chord", ARC), ("axis", ARC), ("tangent", ARC)):
+        filament = rod(align=align, direction=direction.tolist(), shape=shape)
+        r, _ = initial_shape(filament)
+        along = r[-1] - r[0] if align != "tangent" else end_tangents(filament)[0]
+        np.testing.assert_allclose(along / np.linalg.norm(along), direction, atol=1e-14)
+
+
+def test_auto_takes_the_axis_for_relaxed_and_the_tangent_otherwise() -> None:
+    bent = rod(curvature=[2, 0], shape={"kind": "relaxed"})
+    r, _ = initial_shape(bent)
+    np.testing.assert_allclose(r[-1] - r[0], np.sin(1.0) * X, atol=1e-14)
+    np.testing.assert_allclose(end_tangents(rod(shape=ARC))[0], X, atol=1e-15)
+
+
+def test_normal_is_where_e1_points_across_the_axis() -> None:
+    normal = np.array([0.2, 1.0, -0.5])
+    filament = rod(curvature=[3, 1], twist_rate=-2, shape={"kind": "relaxed"}, normal=normal.tolist(), **SPATIAL)
+    _, e1 = initial_shape(filament)
+    across = e1[0] - (e1[0] @ X) * X
+    np.testing.assert_allclose(across / np.linalg.norm(across), np.array([0, 1, -0.5]) / 1.25**0.5, atol=1e-14)
+
+
+def test_placing_neither_stretches_nor_mirrors() -> None:
+    shape = {"kind": "helix", "radius": 0.1, "pitch": 0.3}
+    own, own_e1 = initial_shape(rod(shape=shape, **SPATIAL))
+    keys = {"direction": [0.3, -2.0, 1.0], "normal": [1.0, 1.0, 5.0], "position": [3.0, 1.0, 2.0]}
+    r, e1 = initial_shape(rod(shape=shape, **keys, **SPATIAL))
+    motion = np.linalg.lstsq(own, r - [3.0, 1.0, 2.0], rcond=None)[0]
+    np.testing.assert_allclose(motion @ motion.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(motion) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(e1, own_e1 @ motion, atol=1e-12)
+
+
+def test_what_cannot_be_placed_is_refused_in_one_line() -> None:
+    parallel = rod(direction=[1, 0, 0]).model_copy(update={"normal": (2.0, 0.0, 0.0)})
+    assert fault(parallel).startswith("filament.rod.normal: parallel")
+    closed = rod(curvature=["2*pi", 0], shape={"kind": "relaxed"})
+    assert fault(closed).startswith("filament.rod.align: the ends meet, so the mean tangent is zero")
+    flat = rod(shape={"kind": "helix", "curvature": 3.0, "torsion": 0.0}, **SPATIAL)
+    assert "align: the axis lies along e1" in fault(flat)

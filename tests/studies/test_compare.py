@@ -1,0 +1,183 @@
+"""`ibfil compare`: one scene under several fluids; quantities over whole periods and their scatter."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from ibfil.case.reading import parse_case
+from ibfil.commands import main
+from ibfil.errors import CaseError, RunFailed
+from ibfil.studies.compare.fluids import fluid_overrides, known_fluids
+from ibfil.studies.compare.quantities import Window, quantities, quantity
+from ibfil.studies.compare.study import choose_window, compare
+
+SWIMMER = """
+title = "A small swimmer"
+[filament.rod]
+length = 1.0
+nodes = 13
+bending = 1.0
+stretching = 100.0
+curvature = ["4*sin(2*pi*s - 10*t)", 0]
+shape = { kind = "relaxed" }
+[fluid]
+model = "stokes"
+viscosity = 1.0
+density = 1.0
+box = [2.0, 2.0, 2.0]
+cells = [24, 24, 24]
+[time]
+end = "4*pi/10"
+step = "pi/100"
+[output]
+every = "pi/100"
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("compare")
+    fluids = ("rft", "matched", "stokes", "navier-stokes")
+    return compare(SWIMMER, fluids, folder, say=lambda line: None), folder
+
+
+def test_every_fluid_of_the_schema_can_be_asked_for():
+    assert known_fluids() == ("rft", "matched", "slender", "stokes", "navier-stokes")
+    case = parse_case(SWIMMER, "s")
+    assert fluid_overrides("matched", case) == ("fluid.model=rft", "fluid.drag={matched=1.0}")
+    own = parse_case(SWIMMER, "s", ["fluid.drag={matched=2.0}"])
+    assert fluid_overrides("matched", own) == ("fluid.model=rft",)
+    assert fluid_overrides("rft", own) == ("fluid.model=rft", "fluid.drag=paper")
+    assert fluid_overrides("rft", case) == ("fluid.model=rft",)
+
+
+def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(made):
+    comparison, folder = made
+    by = {column.fluid: column.numbers for column in comparison.columns}
+    assert comparison.window.count == 1
+    assert comparison.window.period == pytest.approx(2 * np.pi / 10, rel=1e-4)
+    assert by["stokes"]["both sides differ by, at most"].value < 1e-10
+    lost = by["stokes"]["lost between nodes and grid, a share"].value
+    assert 0 < lost < 0.2  # far from all; the number: test_dissipation.py
+    inertial = {key: one.value for key, one in by["navier-stokes"].items()}
+    assert "both sides differ by, at most" not in inertial  # one side is not the other while the fluid speeds up
+    moving = inertial["power upon the grid"] - inertial["dissipated by the fluid"]
+    assert inertial["of that into the fluid's motion"] == pytest.approx(moving)
+    assert by["rft"]["dissipated by the fluid"].value == pytest.approx(by["rft"]["power of the nodes"].value)
+    turning = [numbers["frequency (angular)"].value for numbers in by.values() if "frequency (angular)" in numbers]
+    assert turning
+    assert turning == pytest.approx([10.0] * len(turning), rel=1e-2)  # the wave's; the fit's window is one period
+    for fluid in by:
+        assert by[fluid]["speed"].value > 0
+        assert by[fluid]["wall time a unit of time"].value > 0
+    assert "distance from the first, rms/L" not in by["rft"]
+    assert (
+        by["stokes"]["distance from the first, rms/L"].value > by["stokes"]["the same without rigid motion"].value > 0
+    )
+    # Little inertia: nearer to Stokes than resistive-force theory is.
+    near = abs(by["navier-stokes"]["speed"].value - by["stokes"]["speed"].value)
+    assert near < abs(by["rft"]["speed"].value - by["stokes"]["speed"].value)
+    with open(folder / "compare.csv", newline="") as file:
+        rows = {row["quantity"]: row for row in csv.DictReader(file)}
+    assert float(rows["speed"]["matched"]) == by["matched"]["speed"].value
+    told = json.loads((folder / "compare.json").read_text())
+    assert [one["fluid"] for one in told["fluids"]] == list(by)
+    assert told["machine"]
+    assert (folder / "compare.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_it_says_what_each_fluid_models_alone_and_what_that_takes(made):
+    comparison, _ = made
+    own = {column.fluid: column.own for column in comparison.columns}
+    assert any("inertia" in line for line in own["navier-stokes"])
+    assert not any("inertia" in line for line in own["stokes"])
+    assert any("hydrodynamic interaction" in line for line in own["stokes"])
+    assert any("straight rod of length 1" in line for line in own["matched"])
+    assert not any("filament rod" in line for lines in own.values() for line in lines)
+    shares = {column.fluid: " ".join(column.shares) for column in comparison.columns}
+    assert "inertia and advection" in shares["navier-stokes"]
+    assert "flow between nodes" not in shares["rft"]
+
+
+class Moved:
+    """A run as far as `quantities` looks at it: a circle of radius 0.3 that turns at rate 5 and drifts."""
+
+    def __init__(self, drift: np.ndarray) -> None:
+        self.case = parse_case(SWIMMER, "s")
+        self.time = np.linspace(0.0, 4 * np.pi / 5, 401)
+        s = np.linspace(0.0, 1.0, 13)
+        turn = 5 * self.time[:, None]
+        around = np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=-1) * (0.3 * (s**2 - 1 / 3))[None, :, None]
+        position = around + (self.time[:, None] * drift)[:, None, :] + s[None, :, None] * [1, 0, 0]
+        n = len(self.time)
+        columns = {
+            "position": position,
+            "force": np.ones((n, 13, 3)),
+            "velocity": np.full((n, 13, 3), 0.5),
+            "reaction_start": np.column_stack([np.cos(5 * self.time) ** 2, 0 * self.time, 0 * self.time]),
+        }
+        self.filaments = {"rod": columns}
+        self.diagnostics = {"power": np.sin(5 * self.time) ** 2, "dissipation": np.full(n, 0.25)}
+        self.arclength = {"rod": s}.__getitem__
+
+
+def test_means_are_over_whole_periods_and_exact():
+    run = Moved(np.array([0.0, 0.3, 0.4]))
+    window = Window(run.time[-1], 2 * np.pi / 5, 2)
+    found = quantities(run, window)
+    assert found["speed"].value == pytest.approx(0.5, rel=1e-12)
+    assert found["speed"].error == pytest.approx(0.0, abs=1e-12)
+    assert found["velocity z"].value == pytest.approx(0.4, rel=1e-12)
+    assert found["reaction at start x"].value == pytest.approx(0.5, rel=1e-6)
+    assert found["power of the nodes"].value == pytest.approx(0.5, rel=1e-6)
+    assert found["dissipated by the fluid"].value == pytest.approx(0.25)
+    assert found["frequency (angular)"].value == pytest.approx(5.0, rel=1e-3)
+    assert "Lighthill efficiency" not in found  # it is held
+
+
+def test_the_error_is_the_standard_error_of_the_periods():
+    found = quantity(np.array([1.0, 2.0, 3.0, 6.0]), "1")
+    assert found.value == 3.0
+    assert found.error == pytest.approx(np.std([1, 2, 3, 6], ddof=1) / 2)
+    assert quantity(np.array([1.0]), "1").error is None
+
+
+def test_the_window_leaves_the_transient_out_and_counts_whole_periods():
+    case = parse_case(SWIMMER, "s")
+    period = 2 * np.pi / 10
+    window = choose_window(case, 10.3 * period, None, None)
+    assert window.count == 6  # of 10.3 a third is left out
+    assert window.end == 10.3 * period
+    assert choose_window(case, 10.3 * period, None, 2.0 * period).count == 8
+    assert choose_window(case, 9.0, 2.0, 1.0) == Window(9.0, 2.0, 4)
+    with pytest.raises(CaseError, match=r"time\.end"):
+        choose_window(case, 1.5 * period, None, None)
+    still = parse_case(SWIMMER.replace(" - 10*t", ""), "s")
+    assert choose_window(still, 8.0, None, None) == Window(8.0, 1.0, 4)
+
+
+def test_a_fluid_that_fails_is_told_and_the_others_are_compared(tmp_path, monkeypatch, environment, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(SWIMMER.replace("density = 1.0", ""))
+    assert main.main(["compare", "s.toml", "--fluids", "rft,slender,navier-stokes", "-o", "out"]) == 1
+    out = capsys.readouterr().out
+    assert "density" in out
+    assert "rft" in out
+    assert "Traceback" not in out
+
+
+@pytest.mark.parametrize("fluids", [("rft",), ("rft", "rft"), ("rft", "honey")])
+def test_what_cannot_be_compared_is_refused(tmp_path, fluids):
+    with pytest.raises(CaseError, match="--fluids"):
+        compare(SWIMMER, fluids, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+def test_where_no_run_ends_there_is_nothing_to_compare(tmp_path):
+    wild = ["time.scheme=explicit", "time.step=0.01", "filament.rod.stretching=1e7"]
+    with pytest.raises(RunFailed, match="no fluid's run came to an end"):
+        compare(SWIMMER, ("rft", "stokes"), tmp_path, wild, say=lambda line: None)

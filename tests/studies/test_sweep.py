@@ -1,0 +1,112 @@
+"""`ibfil sweep`: combinations of any keys, a table of all observables, a job array; and what studies share."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+from helpers.made_run import BENT
+
+from ibfil.commands import main
+from ibfil.errors import CaseError
+from ibfil.io.reader import RunFile
+from ibfil.studies.settings import axis, axis_of, combinations
+from ibfil.studies.sweep import sweep
+from ibfil.studies.tables import write_csv, write_json
+
+
+def test_an_axis_reads_values_with_commas_of_their_own():
+    lists = axis("fluid.box=[2, 2,2],[4,4,4]")
+    assert lists.keys == ("fluid.box",)
+    assert lists.values == (("[2, 2,2]",), ("[4,4,4]",))
+    formulas = axis("""filament.rod.curvature=["atan2(s,1)",0],['2,5',"x"]""")
+    assert formulas.values == (("""["atan2(s,1)",0]""",), ("""['2,5',"x"]""",))
+    tied = axis("time.scheme=explicit,implicit & time.order=1,2")
+    assert tied.keys == ("time.scheme", "time.order")
+    assert tied.values == (("explicit", "1"), ("implicit", "2"))
+    assert axis_of("fluid.cells", [[8, 8, 8], [16, 16, 16]]).values == (("[8, 8, 8]",), ("[16, 16, 16]",))
+
+
+@pytest.mark.parametrize("text", ["", "time.step", "=1", "time.step=", "time.step=1,,2", "a=1,2&b=1,2,3", "a=1&"])
+def test_what_is_no_axis_is_refused(text):
+    with pytest.raises(CaseError, match="allowed"):
+        axis(text)
+
+
+def test_combinations_have_names_that_files_can_have_and_that_differ():
+    settings = combinations([axis('a.b=1,"x/y"'), axis("c.b=[1,2],[1 2]"), axis("d=7")])
+    assert len({one.name for one in settings}) == len(settings) == 4
+    assert settings[0].name == "a.b=1,c.b=1x2,d=7"
+    assert all("/" not in one.name for one in settings)
+    assert settings[0].overrides == ("a.b=1", "c.b=[1,2]", "d=7")
+    long = combinations([axis(f"{'k' * 30}{i}={'9' * 30}") for i in range(9)])[0]
+    assert len(long.name) <= 120
+    with pytest.raises(CaseError, match=r"a\.b: found twice"):
+        combinations([axis("a.b=1"), axis("a.b=2")])
+    assert [one.name for one in combinations([])] == ["as_it_is"]
+
+
+VARY = ["--vary", "fluid.viscosity=1,2", "--vary", "filament.rod.bending=1,-1"]
+
+
+def test_a_sweep_makes_a_table_of_all_observables_and_tells_what_failed(here, capsys):
+    assert main.main(["sweep", "bent.toml", "time.end=0.01", *VARY]) == 1
+    out = capsys.readouterr().out
+    assert out.splitlines()[-1] == "bent-sweep/sweep.csv"
+    with open("bent-sweep/sweep.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["fluid.viscosity"], row["filament.rod.bending"]) for row in rows] == [
+        ("1", "1"),
+        ("1", "-1"),
+        ("2", "1"),
+        ("2", "-1"),
+    ]
+    assert [row["status"] for row in rows] == ["finished", "failed", "finished", "failed"]
+    assert "bending" in rows[1]["message"]
+    assert rows[1]["span"] == ""
+    for row in (rows[0], rows[2]):
+        with RunFile(f"bent-sweep/{row['run']}.h5") as run:
+            assert run.case.fluid.viscosity == float(row["fluid.viscosity"])
+            assert run.case.time.end == 0.01
+            assert float(row["span"]) == float(run.observables["span"][-1])
+    assert rows[0]["span"] != rows[2]["span"]
+    told = json.loads((here / "bent-sweep/sweep.json").read_text())
+    assert told["machine"]
+    assert [one["status"] for one in told["runs"]] == [row["status"] for row in rows]
+
+
+def test_as_a_job_array_each_index_is_one_run_and_the_table_comes_after(here, capsys):
+    command = ["sweep", "bent.toml", "--vary", "fluid.viscosity=1,2", "-o", "out"]
+    assert main.main([*command, "--list"]) == 0
+    assert capsys.readouterr().out.splitlines() == ["0  viscosity=1", "1  viscosity=2"]
+    assert not (here / "out").exists()
+    assert main.main([*command, "--index", "1"]) == 0
+    assert [path.name for path in (here / "out").iterdir()] == ["viscosity=2.h5"]
+    assert main.main([*command, "--index", "2"]) == 2
+    assert "allowed: 0 to 1" in capsys.readouterr().err
+    assert main.main([*command, "--index", "0"]) == 0
+    times = {path: path.stat().st_mtime_ns for path in (here / "out").glob("*.h5")}
+    assert main.main(command) == 0
+    assert {path: path.stat().st_mtime_ns for path in (here / "out").glob("*.h5")} == times
+
+
+def test_a_sweep_whose_case_is_at_fault_in_every_form_writes_nothing(here, capsys):
+    assert main.main(["sweep", "bent.toml", "--vary", "fluid.viscosty=1,2"]) == 2
+    assert main.main(["sweep", "bent.toml", "fluid.viscosity=-1", "--vary", "time.end=1,2"]) == 2
+    assert main.main(["sweep", "nothing.toml", "--vary", "time.end=1,2"]) == 2
+    assert capsys.readouterr().err.count("\n") == 3
+    assert [path.name for path in here.iterdir()] == ["bent.toml"]
+
+
+def test_from_python(tmp_path):
+    rows = sweep(BENT, [axis_of("fluid.viscosity", [1.0, 2.0])], tmp_path, ["time.end=0.01"], say=lambda line: None)
+    assert [row.setting.values["fluid.viscosity"] for row in rows] == ["1.0", "2.0"]
+    assert all(row.outcome.done and row.numbers["span"] > 0 for row in rows)
+
+
+def test_tables_keep_all_digits_and_json_has_no_nan(tmp_path):
+    write_csv(tmp_path / "t.csv", [{"a": 0.1 + 0.2}, {"b": "x,y", "a": None}])
+    assert (tmp_path / "t.csv").read_text() == 'a,b\n0.30000000000000004,\n,"x,y"\n'
+    write_json(tmp_path / "t.json", {"a": [float("nan"), 1.0]})
+    assert "null" in (tmp_path / "t.json").read_text()

@@ -1,0 +1,259 @@
+"""Thermal forces: the kicks, the scheme's step, and the runs they are part of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import tomli_w
+from helpers.runs import content, go_on, interrupted, real, run
+from helpers.thermal_scenes import BENT, ROD, USUAL, blocks, scene, walk
+from scipy import linalg, stats
+
+from ibfil.case.reading import parse_case
+from ibfil.check.dimensionless import groups
+from ibfil.fluids import resistive_force
+from ibfil.linalg import banded
+from ibfil.rods.geometry import measure
+from ibfil.simulation.simulation import Simulation
+
+# --- the kicks ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("directions", ["xyz", "xy"])
+def test_kicks_have_the_covariance_of_the_drag_and_nodes_know_nothing_of_each_other(directions):
+    energy, dt, count = 0.3, 1e-3, 20000
+    simulation = Simulation(scene({"rod": BENT}, energy, directions=directions))
+    noise, shape = simulation.model.noise, simulation.shape
+    draws = np.array([noise.force(shape, dt) for _ in range(count)]) * dt
+    mean = np.asarray(noise.force(shape, 1e300)) * dt  # what does not vanish as the step grows: the drift
+    n = len(mean)
+    z = blocks(simulation)
+    kicked = [0, 1, 2, 3] if directions == "xyz" else [0, 1, 3]
+    if directions == "xy":
+        assert np.all(draws[:, :, 2] == 0)
+    root = np.linalg.cholesky(2 * energy * dt * z[:, kicked][:, :, kicked])
+    white = np.linalg.solve(root, (draws - mean)[:, :, kicked].transpose(1, 2, 0)).reshape(n * len(kicked), count)
+    covariance = white @ white.T / count
+    low, high = stats.chi2.ppf([(1 - USUAL) / 2, (1 + USUAL) / 2], count * len(white)) / (count * len(white))
+    assert low < np.trace(covariance) / len(white) < high
+    for values in (count * (np.diag(covariance) - 1) ** 2 / 2, count * covariance[np.triu_indices(len(white), 1)] ** 2):
+        assert values.sum() < stats.chi2.ppf(USUAL, len(values))
+    assert count * np.sum(white.mean(axis=1) ** 2) < stats.chi2.ppf(USUAL, len(white))
+
+
+CLAMPED = {"end": "clamped"}
+
+
+@pytest.mark.parametrize("directions", ["xyz", "xy"])
+@pytest.mark.parametrize(
+    "rod",
+    [
+        BENT,
+        {**BENT, "derivative": 6},
+        {**BENT, "spacing": "q*(1 + q)/2"},
+        {**BENT, "start": CLAMPED},
+        {**BENT, "start": {"end": "hinged"}},
+    ],
+    ids=["free", "order 6", "uneven", "clamped", "hinged"],
+)
+def test_the_drift_is_kt_times_the_divergence_of_the_mobility(rod, directions):
+    """Each node's mobility is differenced along each direction it is kicked in; others do not enter it."""
+    energy, h = 0.3, 1e-5
+    simulation = Simulation(scene({"rod": rod}, energy, directions=directions))
+    noise, shape = simulation.model.noise, simulation.shape
+    if directions == "xy":  # in the plane, as it is meant
+        flat = shape.r * [1, 1, 0]
+        shape = simulation.mechanics.start(flat, np.tile([0.0, 0.0, 1.0], (len(flat), 1)))
+    drag, dimensions = simulation.fluid.drag, len(directions)
+
+    def mobility(r: np.ndarray, i: int, a: int) -> np.ndarray:
+        """Column a of node i's mobility, at positions r."""
+        unit = np.zeros((len(r), 4))
+        unit[i, a] = 1.0
+        return resistive_force.mobilize(drag, measure(simulation.mechanics.mesh, r, shape.e1).e3, unit)[i, :3]
+
+    expected = np.zeros_like(shape.r)
+    free = np.setdiff1d(np.arange(4 * len(shape.r)), simulation.mechanics.ends.index)
+    for i in np.unique(free[free % 4 < 3] // 4):
+        for a in range(dimensions):
+            there, back = shape.r.copy(), shape.r.copy()
+            there[i, a] += h
+            back[i, a] -= h
+            expected[i] += energy * (mobility(there, i, a) - mobility(back, i, a)) / (2 * h)
+    found = resistive_force.mobilize(drag, shape.e3, noise.force(shape, 1e300))
+    assert np.max(np.abs(expected)) > 1
+    np.testing.assert_allclose(found[:, :3], expected, atol=1e-6 * np.max(np.abs(expected)))
+    assert np.max(np.abs(found[:, 3])) < 1e-100
+
+
+def test_without_the_drift_the_ends_of_a_free_rod_would_be_pushed_inwards_by_one_and_a_half_kt_over_ds():
+    energy = 0.3
+    simulation = Simulation(scene({"rod": ROD}, energy))
+    drift = simulation.model.noise.force(simulation.shape, 1e300)
+    expected = np.zeros((9, 3))
+    expected[[0, -1], 0] = np.array([-1, 1]) * 1.5 * energy * 8
+    np.testing.assert_allclose(drift, expected, atol=1e-12)
+
+
+# --- the step -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("force", ["eq44", "torque-free"])
+def test_a_step_is_the_linearised_trapezoid(force):
+    """(Z - dt/2 K) y = dt (f + Z u0) + xi in full, K by differencing the forces, in a flow, with a spun clamp."""
+    rod = {**BENT, "force": force, "start": {**CLAMPED, "spin": 3.0}, "shape": {"kind": "straight"}}
+    flow = {"flow": ["0.3*y", "0.2", "10*t"]}
+    dt = 1e-3
+    simulation = Simulation(scene({"rod": rod}, 1e-3, fluid=flow, time={"step": dt}))
+    twin = Simulation(simulation.case)
+    start, mechanics = simulation.shape, simulation.mechanics
+    n, m = len(start.r), 4
+    middle = 0.5 * dt
+
+    def forces(y: np.ndarray) -> np.ndarray:
+        return mechanics.forces(mechanics.move(start, y.reshape(n, m)), middle)[0].ravel()
+
+    h = 1e-6
+    k = np.array([(forces(h * e) - forces(-h * e)) / (2 * h) for e in np.eye(n * m)]).T
+    z = linalg.block_diag(*blocks(simulation))
+    kicks = dt * twin.model.noise.force(start, dt).ravel()
+    u0 = np.zeros((n, m))
+    u0[:, :3] = np.stack([0.3 * start.r[:, 1], np.full(n, 0.2), np.full(n, 10 * middle)], axis=1)
+    held, prescribed = mechanics.ends.index, np.array([0, 0, 0, 3.0 * dt])
+    left, right = z - 0.5 * dt * k, dt * (forces(np.zeros(n * m)) + z @ u0.ravel()) + kicks
+    free = np.setdiff1d(np.arange(n * m), held)
+    expected = np.zeros(n * m)
+    expected[held] = prescribed
+    expected[free] = np.linalg.solve(left[np.ix_(free, free)], (right - left @ expected)[free])
+    step = simulation.attempt(dt)
+    np.testing.assert_allclose(step.state.y_old.ravel(), expected, atol=1e-6 * np.max(np.abs(expected)))
+    # What the rods do to the fluid is what moves them against it, less its kicks.
+    felt = (z @ (expected / dt - u0.ravel()) - kicks / dt).reshape(n, m)
+    np.testing.assert_allclose(step.force, felt, atol=1e-5 * np.max(np.abs(felt)))
+
+
+def test_a_free_rod_gives_the_fluid_no_net_force_however_it_is_kicked():
+    simulation = Simulation(scene({"rod": BENT}, 1e-2))
+    walk(simulation, 20)
+    frame = simulation.frame()
+    size = np.sum(np.abs(frame.filaments["rod"].force))
+    assert size > 1
+    assert np.max(np.abs(frame.diagnostics["net_force"])) < 1e-9 * size
+
+
+@pytest.mark.parametrize("force", ["eq44", "torque-free"])
+@pytest.mark.parametrize("spacing", ["even", "q*(2 + q)/3"])
+@pytest.mark.parametrize("ends", [("free", "free"), ("clamped", "free"), ("hinged", "clamped"), ("clamped", "clamped")])
+def test_the_stiffness_of_a_straight_rod_at_rest_is_symmetric(ends, spacing, force):
+    """Else no drag gives it Boltzmann's law: with stencils of order 6, or the cubic at a clamp, it is not."""
+    rod = {**BENT, "curvature": [0, 0], "twist_rate": 0, "spacing": spacing, "force": force, "nodes": 11}
+    rod |= {"start": {"end": ends[0]}, "finish": {"end": ends[1]}}
+    for derivative in (2, 6):
+        simulation = Simulation(scene({"rod": {**rod, "derivative": derivative}}))
+        mechanics, shape = simulation.mechanics, simulation.shape
+        _, inner = mechanics.forces(shape, 0.0)
+        k = banded.dense(mechanics.stiffness(shape, shape, inner, 0.0)).reshape(44, 44)
+        free = np.setdiff1d(np.arange(44), mechanics.ends.index)
+        k = k[np.ix_(free, free)]
+        uneven = np.max(np.abs(k - k.T)) / np.max(np.abs(k))
+        assert uneven < 1e-12 if derivative == 2 else uneven > 1e-3
+
+
+def test_twist_is_left_out_where_it_is_asked():
+    simulation = Simulation(scene({"rod": {**ROD, "twisting": 1.0}}, 1e-6, twist=False))
+    assert np.all(simulation.model.noise.force(simulation.shape, 1e-3)[:, 3] == 0)
+
+
+# --- runs ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
+    ends = []
+    for seed in (1, 1, 2):
+        simulation = Simulation(scene({"rod": BENT}, seed=seed))
+        walk(simulation, 10)
+        ends.append((simulation.shape.r.tobytes(), simulation.shape.e1.tobytes()))
+    assert ends[0] == ends[1]
+    assert ends[0][0] != ends[2][0]
+
+
+def test_a_run_cut_twice_is_as_never_cut(tmp_path):
+    case = scene({"rod": BENT}, time={"end": 0.003, "step": 1e-4})
+    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
+    run(case, whole, build=real)
+    interrupted(path, 2, case, real)
+    interrupted_again = tmp_path / "again.h5"
+    interrupted(interrupted_again, 11, case, real)
+    for cut in (path, interrupted_again):
+        go_on(cut, build=real)
+        assert content(cut) == content(whole)
+
+
+def test_no_random_numbers_are_made_or_kept_without_a_thermal_table():
+    text = tomli_w.dumps(
+        {
+            "filament": {"rod": ROD},
+            "fluid": {"model": "rft", "viscosity": 1.0},
+            "time": {"end": 1.0, "step": 1e-3},
+            "output": {"every": 1.0},
+        }
+    )
+    simulation = Simulation(parse_case(text, "test.toml"))
+    assert simulation.model.noise is None
+    assert "random" not in simulation.state()
+    assert "random" in Simulation(scene({"rod": ROD})).state()
+
+
+def test_no_energy_no_kicks():
+    simulation = Simulation(scene({"rod": ROD}, 0.0))
+    before = simulation.shape.r.copy()
+    walk(simulation, 10)
+    assert np.array_equal(simulation.shape.r, before)
+    assert "A/(kT L)" not in groups(simulation)
+
+
+def test_kicks_in_the_plane_leave_a_rod_in_it():
+    rod = {**ROD, "curvature": [0, 3.0], "normal": [0, 1, 0], "shape": {"kind": "relaxed"}}
+    simulation = Simulation(scene({"rod": rod}, 1e-2, directions="xy"))
+    start = simulation.shape.r.copy()
+    walk(simulation, 100)
+    moved = simulation.shape.r - start
+    assert np.max(np.abs(moved[:, :2])) > 1e-2
+    assert np.max(np.abs(moved[:, 2])) < 1e-12
+
+
+def test_held_ends_stay_and_a_clamp_that_leaves_twist_free_turns():
+    rod = {**ROD, "twisting": 1.0, "start": {"end": "clamped"}, "finish": {"end": "hinged"}}
+    free = {**ROD, "twisting": 1.0, "start": {"end": "clamped", "twist": "free"}}
+    simulation = Simulation(scene({"held": rod, "free": free}, 1e-3))
+    before = simulation.shape
+    walk(simulation, 50)
+    after = simulation.shape
+    for node in (0, 8, 9):
+        np.testing.assert_allclose(after.r[node], before.r[node], atol=1e-15)
+    for node in (0, 9):
+        np.testing.assert_allclose(after.e3[node], before.e3[node], atol=1e-15)
+    np.testing.assert_allclose(after.e1[0], before.e1[0], atol=1e-14)
+    assert np.max(np.abs(after.e1[9] - before.e1[9])) > 1e-3
+    assert np.min(np.linalg.norm(after.r - before.r, axis=1)[1:8]) > 1e-4
+
+
+def test_a_rod_that_does_not_twist_beside_one_that_does_is_not_turned():
+    simulation = Simulation(scene({"plain": ROD, "twisting": {**ROD, "twisting": 1.0}}))
+    kicks = simulation.model.noise.force(simulation.shape, 1e-3)
+    assert np.all(kicks[:9, 3] == 0)
+    assert np.all(kicks[9:, 3] != 0)
+
+
+def test_a_soft_round_rod_without_twist_may_turn_its_frame_at_will():
+    """Its e1 is carried along as kicks turn the tangents, differently from node to node; that is no twist."""
+    simulation = Simulation(scene({"rod": ROD}, 0.1))
+    twisted = measure(simulation.mechanics.mesh, simulation.shape.r, np.tile([[0, 0, 1.0], [0, 1.0, 0]], (5, 1))[:9])
+    simulation.state_now = simulation.state_now._replace(shape=twisted)
+    walk(simulation, 1)
+    assert np.max(np.abs(simulation.shape.twist)) > 0
+
+
+def test_a_step_that_fails_is_not_tried_again_with_other_kicks():
+    simulation = Simulation(scene({"rod": ROD}, time={"min_step": 1e-12}))
+    assert not simulation.may_halve(1.0)
