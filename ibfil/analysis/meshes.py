@@ -14,8 +14,8 @@ from .periodic_images import Pieces, unwrapped, wrapped
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkDataSet
 
-    from ..io.frames import FilamentFrame, Frame
     from ..io.reader import RunFile
+    from ..io.snapshots import FilamentSnapshot, Snapshot
 
 
 class View(NamedTuple):
@@ -57,11 +57,11 @@ def filament_data(run: RunFile, output: int, view: View = PLAIN) -> vtkDataSet:
 
     Raises ValueError where ``view`` asks for a periodic box and the case has none.
     """
-    return polylines(run.frame(output), rods_of(run), box_of(run), view)
+    return polylines(run.snapshot(output), rods_of(run), box_of(run), view)
 
 
 def field_data(run: RunFile, number: int) -> vtkDataSet:
-    """The fields put out at ``grid.time[number]`` as vtkImageData, with the Q-criterion where there is a velocity."""
+    """The fields written at ``grid.time[number]`` as vtkImageData, with the Q-criterion where there is a velocity."""
     grid = run.grid
     assert grid is not None
     fields = {name: column[number] for name, column in grid.fields.items()}
@@ -96,7 +96,9 @@ def q_criterion(velocity: np.ndarray, spacing: np.ndarray) -> np.ndarray:
     return 0.5 * (trace**2 - np.einsum("ab...,ba...->...", gradient, gradient))
 
 
-def polylines(frame: Frame, rods: dict[str, Rod], box: np.ndarray | None = None, view: View = PLAIN) -> vtkDataSet:
+def polylines(
+    snapshot: Snapshot, rods: dict[str, Rod], box: np.ndarray | None = None, view: View = PLAIN
+) -> vtkDataSet:
     """All filaments at one time as vtkPolyData: a polyline a filament, arrays at the nodes in float32.
 
     Wrapped ones are cut at the faces of the box, with points there; images carry which box they are in (``image``).
@@ -109,7 +111,7 @@ def polylines(frame: Frame, rods: dict[str, Rod], box: np.ndarray | None = None,
     lengths: list[int] = []
     shifts = sorted(product(range(-view.images, view.images + 1), repeat=3), key=lambda shift: shift != (0, 0, 0))
     for number, (name, rod) in enumerate(rods.items()):
-        filament = frame.filaments[name]
+        filament = snapshot.filaments[name]
         pieces = wrapped(filament.position, -0.5 * box, box) if view.wrap else unwrapped(len(rod.s))
         own = pieces.take(filament.position) - pieces.image * box
         shown = _on(pieces, _node_arrays(filament, rod))
@@ -119,7 +121,7 @@ def polylines(frame: Frame, rods: dict[str, Rod], box: np.ndarray | None = None,
             more = {"image": np.tile(np.array(shift, np.int32), (len(own), 1))} if view.images else {}
             arrays.append(shown | more)
             lengths += pieces.lengths
-    return _poly_data(np.concatenate(points), lengths, arrays, frame.time)
+    return _poly_data(np.concatenate(points), lengths, arrays, snapshot.time)
 
 
 def _on(pieces: Pieces, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -149,7 +151,7 @@ def _poly_data(
     return data
 
 
-def _node_arrays(filament: FilamentFrame, rod: Rod) -> dict[str, np.ndarray]:
+def _node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
     """The arrays of one filament as they appear in ParaView, all with N rows.
 
     Tension lives on segments: a node shows the mean of its two, an end its only one.

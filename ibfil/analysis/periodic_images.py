@@ -30,12 +30,12 @@ def unwrapped(count: int) -> Pieces:
 
 def wrapped(r: np.ndarray, origin: np.ndarray, box: np.ndarray) -> Pieces:
     """The filament r (N, 3) cut at the faces of the box, with a point on each side of a cut."""
-    place = (r - origin) / box
-    stations = np.unique(np.concatenate([np.arange(float(len(r))), _crossings(place)]))
+    location = (r - origin) / box
+    stations = np.unique(np.concatenate([np.arange(float(len(r))), _crossings(location)]))
     middle = 0.5 * (stations[:-1] + stations[1:])
     low = middle.astype(int)
     part = (middle - low)[:, None]
-    image = np.floor((1.0 - part) * place[low] + part * place[low + 1])
+    image = np.floor((1.0 - part) * location[low] + part * location[low + 1])
     cuts = np.nonzero(np.any(np.diff(image, axis=0) != 0, axis=1))[0] + 1
     points, images, lengths = [], [], []
     for piece in np.split(np.arange(len(middle)), cuts):
@@ -45,11 +45,11 @@ def wrapped(r: np.ndarray, origin: np.ndarray, box: np.ndarray) -> Pieces:
     return Pieces(np.concatenate(points), np.concatenate(images), lengths)
 
 
-def _crossings(place: np.ndarray) -> np.ndarray:
-    """Where segments cross whole numbers of ``place`` (N, 3): node numbers with fractions."""
+def _crossings(location: np.ndarray) -> np.ndarray:
+    """Where segments cross whole numbers of ``location`` (N, 3): node numbers with fractions."""
     found = []
     for axis in range(3):
-        x = place[:, axis]
+        x = location[:, axis]
         for i in np.nonzero(np.floor(x[:-1]) != np.floor(x[1:]))[0]:
             low, high = sorted((x[i], x[i + 1]))
             faces = np.arange(np.ceil(low), np.floor(high) + 1)

@@ -102,7 +102,7 @@ class Run(RunFile):
     def field(self, time: float | None = None) -> pyvista.ImageData:
         """The recorded fields nearest to ``time``, by default the last, with the Q-criterion where there is a velocity.
 
-        Point (i, j, k) lies at origin + spacing (i, j, k). Raises CaseError where no fields were put out.
+        Point (i, j, k) lies at origin + spacing (i, j, k). Raises CaseError where no fields were written.
         """
         import pyvista
 

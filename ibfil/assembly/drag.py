@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..case.schema import Case
     from ..fluids.calibrated_drag import Match
-    from .stacked import Stacked
+    from .stacked import RodStack
 
 
 def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None) -> tuple[float, float, np.ndarray]:
@@ -61,9 +61,9 @@ def matching(case: Case, filament: Filament) -> Match | None:
         raise CaseError([f"{case.file}: fluid.drag: {error}; allowed: {allowed}"]) from None
 
 
-def drag(case: Case, stacked: Stacked) -> resistive_force.Drag:
+def drag(case: Case, stacked: RodStack) -> resistive_force.Drag:
     """The drag of every node: coefficients times control volumes."""
-    volume = stacked.mechanics.mesh.volume
+    volume = stacked.system.mesh.volume
     out = resistive_force.Drag(*(np.zeros(len(volume)) for _ in range(3)))
     for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
         s = stacked.s[where]

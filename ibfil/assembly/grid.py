@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..fluids.coupling import Coupling
     from ..grid.kernels import Kernel
     from ..grid.periodic_grid import Grid
-    from .stacked import Stacked
+    from .stacked import RodStack
 
 
 def kernel(case: Case) -> Kernel:
@@ -70,7 +70,7 @@ def twist_radius(case: Case) -> float:
     return kernel(case).twist_radius * spacing(case) / float(np.sqrt(1.0 + case.fluid.slip))
 
 
-def coupling(case: Case, stacked: Stacked) -> Coupling:
+def coupling(case: Case, stacked: RodStack) -> Coupling:
     """What of a node goes through the grid."""
     if not case.couples_torque:
         from ..fluids.coupling import TRANSLATION
@@ -78,7 +78,7 @@ def coupling(case: Case, stacked: Stacked) -> Coupling:
         return TRANSLATION
     from ..fluids.torque_coupling import TorqueCoupling, spin_mobility
 
-    n, volume = len(stacked.s), stacked.mechanics.mesh.volume
+    n, volume = len(stacked.s), stacked.system.mesh.volume
     widest = twist_radius(case)
     radius, twists = np.full(n, widest), np.zeros(n)
     for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):

@@ -18,14 +18,14 @@ from ..case import spacing
 from ..case.filament import copy_name
 from ..errors import CaseError
 from ..rods.base import NoContact
-from ..rods.boundary_conditions import HeldEnd, HeldEnds, Turn, spinning, steady, turned
+from ..rods.boundary_conditions import PrescribedEnd, PrescribedEnds, Turn, spinning, steady, turned
 from ..rods.mesh import Segmented, stack
-from ..rods.system import Mechanics
+from ..rods.system import RodSystem
 from ..shapes import copies, initial
 from . import laws
 from .loads import loads, number, triple
 from .profiles import along, half
-from .stacked import Stacked
+from .stacked import RodStack
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
@@ -92,7 +92,7 @@ def _clamp_tangents(filament: Filament, key: str, folder: Path) -> Tangents:
     return held[0], held[1]
 
 
-def _ends(filaments, nodes, unknowns: int) -> tuple[HeldEnds, np.ndarray]:
+def _ends(filaments, nodes, unknowns: int) -> tuple[PrescribedEnds, np.ndarray]:
     """The held unknowns, and the mask (n,) of end nodes that carry no moment."""
     held, free = [], np.zeros(nodes[-1].stop, bool)
     idle: list[int] = []
@@ -101,10 +101,10 @@ def _ends(filaments, nodes, unknowns: int) -> tuple[HeldEnds, np.ndarray]:
             free[node] = not end.clamped
             if end.held:
                 moves = None if end.moves is None else triple(end.moves, "t")
-                held.append(HeldEnd(node, _turn(end), moves))
+                held.append(PrescribedEnd(node, _turn(end), moves))
         if unknowns == 4 and filament.twisting is None:
             idle += range(where.start, where.stop)
-    return HeldEnds(held, unknowns, np.array(idle, np.int64)), free
+    return PrescribedEnds(held, unknowns, np.array(idle, np.int64)), free
 
 
 def _segmented(placed: Placed, thermal: bool) -> Segmented:
@@ -113,7 +113,7 @@ def _segmented(placed: Placed, thermal: bool) -> Segmented:
     return Segmented(placed.s, derivative, placed.held[0], placed.held[1], thermal and derivative == 2)
 
 
-def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> Stacked:
+def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> RodStack:
     """All filaments of the case, placed and stacked; ``given`` are laws made in Python, by filament.
 
     Raises CaseError for shapes that cannot be made and laws of filaments there are not.
@@ -132,7 +132,7 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> S
     law = laws.law(filaments, nodes, s, mesh, own)
     stretching = half(along(filaments, nodes, s, lambda f: f.stretching))
     length = min(f.length for f in filaments)
-    kind = Mechanics
+    kind = RodSystem
     if filaments[0].force == "torque-free":
         from ..rods.torque_free import TorqueFree
 
@@ -144,6 +144,6 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> S
 
         touching = contact(case, names, filaments, nodes, s)
         forces += touching.loads()
-    mechanics = kind(mesh, law, stretching, free, ends, forces, unknowns, length)
-    start = mechanics.start(np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
-    return Stacked(names, filaments, tuple(nodes), s, mechanics, start, touching)
+    system = kind(mesh, law, stretching, free, ends, forces, unknowns, length)
+    start = system.start(np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
+    return RodStack(names, filaments, tuple(nodes), s, system, start, touching)

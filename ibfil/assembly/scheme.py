@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING
 from ..timestepping import base as timestepping_base
 from ..timestepping import explicit, implicit, semi_implicit
 from . import drag
-from .stacked import Stacked
+from .stacked import RodStack
 
 if TYPE_CHECKING:
     from ..case.schema import Case
     from ..timestepping.brownian import Noise
 
 
-def noise(case: Case, stacked: Stacked) -> Noise | None:
+def noise(case: Case, stacked: RodStack) -> Noise | None:
     """The thermal noise of the case; None where it has none."""
     thermal = case.thermal
     if thermal is None:
         return None
     from ..timestepping.brownian import Noise
 
-    mechanics = stacked.mechanics
+    system = stacked.system
     return Noise(
         drag.drag(case, stacked),
-        mechanics.mesh,
-        mechanics.ends.index,
-        mechanics.unknowns,
+        system.mesh,
+        system.ends.index,
+        system.unknowns,
         thermal.energy,
         thermal.seed,
         thermal.directions == "xy",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..rods.base import NoContact
-from ..rods.geometry import Geometry
-from ..rods.system import Mechanics
+from ..rods.geometry import Configuration
+from ..rods.system import RodSystem
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Stacked:
+class RodStack:
     """The rods of a scene: names and node ranges of its filaments, arclength (n,), and the whole of their mechanics."""
 
     names: tuple[str, ...]
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
     s: np.ndarray
-    mechanics: Mechanics
-    start: Geometry
+    system: RodSystem
+    start: Configuration
     contact: Contact | NoContact
 
     def locate(self, node: int) -> tuple[str, int]:

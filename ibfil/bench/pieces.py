@@ -27,11 +27,11 @@ def rft_step(nodes: int = 128) -> Row:
     """One semi-implicit step in RFT, its preferred curvature evaluated, against one dgbsv of the same matrix."""
     simulation = Simulation(parse_case(case_text(nodes, "rft", "auto", "semi-implicit", 1e-2, 1.6e4), "bench"))
     simulation.advance(0.05, lambda: None)
-    rods, state, scheme = simulation.mechanics, simulation.state_now, semi_implicit.SemiImplicit()
+    rods, state, scheme = simulation.system, simulation.state_now, semi_implicit.SemiImplicit()
     fluid = simulation.fluid
-    force, inner = rods.forces(state.shape, state.time)
-    matrix = rods.definite_stiffness(state.shape, state.shape, inner, state.time)
-    _system(matrix, fluid.drag, state.shape.e3, np.zeros_like(force), force, 100.0)  # type: ignore[attr-defined]
+    force, inner = rods.forces(state.configuration, state.time)
+    matrix = rods.definite_stiffness(state.configuration, state.configuration, inner, state.time)
+    _system(matrix, fluid.drag, state.configuration.e3, np.zeros_like(force), force, 100.0)  # type: ignore[attr-defined]
     width, diagonals = banded.lapack_form(matrix)
     room = np.zeros((3 * width + 1, diagonals.shape[1]), order="F")
     room[width:] = diagonals
@@ -130,7 +130,7 @@ def swimmers(end: float = 1.2566370614359172) -> list[Row]:
             began = time.process_time()
             simulation.advance(end, lambda: None)
             times.append(time.process_time() - began)
-        return statistics.median(times), simulation.shape.r
+        return statistics.median(times), simulation.configuration.r
 
     step = 0.05
     _, reference = run("table", "implicit", step / 60)

@@ -2,7 +2,7 @@
 
 The text is never evaluated as Python. It is read by the standard ``ast``; every node must be on a short
 list; names of [parameters] become numbers, and what is constant is worked out at once. numexpr, which itself
-evaluates text as Python, is given text written anew from the tree, so it sees nothing a user typed.
+evaluates text as Python, is given text written again from the tree, so it sees nothing a user typed.
 """
 
 from __future__ import annotations

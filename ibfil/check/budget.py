@@ -25,7 +25,7 @@ _CONTACT, _NOISE = 1.5, 0.1  # the same of an implicit one
 def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
     """Return every term that the case names; ``memory`` are bytes of large arrays by what they are for."""
     case, n = simulation.case, len(simulation.arclength)
-    unknowns, band = simulation.mechanics.unknowns, memory[BAND]
+    unknowns, band = simulation.system.unknowns, memory[BAND]
     rods, implicit = costs.of_rods(case, n), costs.of_rods(case, n, "implicit")
     out = [Term("bending and stretching", rods, band * 9 / unknowns**2)]
     if unknowns == 4:
@@ -45,8 +45,8 @@ def shares(found: list[Term]) -> list[tuple[str, float, float]]:
 
 def memory(simulation: Simulation) -> dict[str, float]:
     """Bytes of the large arrays, by what they are for."""
-    n, m = len(simulation.arclength), simulation.mechanics.unknowns
-    band = 8.0 * n * m * m * (2 * simulation.mechanics.profile.width + 1)
+    n, m = len(simulation.arclength), simulation.system.unknowns
+    band = 8.0 * n * m * m * (2 * simulation.system.profile.width + 1)
     return {BAND: band, **simulation.model.fluid_model.memory(simulation.rods)}
 
 
@@ -54,7 +54,7 @@ def disk(simulation: Simulation) -> float:
     """Bytes of the run file, at most: fields are compressed."""
     case, n = simulation.case, len(simulation.arclength)
     outputs = len(case.output.times or ()) or case.time.end / (case.output.every or case.time.end) + 1
-    size = outputs * n * 8.0 * (20 if simulation.mechanics.unknowns == 3 else 26)
+    size = outputs * n * 8.0 * (20 if simulation.system.unknowns == 3 else 26)
     if simulation.grid is not None and case.output.grid_every is not None:
         points = float(np.prod(np.ceil(simulation.grid.cells / case.output.grid_stride)))
         size += (case.time.end / case.output.grid_every + 1) * points * 12.0 * len(case.output.fields)

@@ -120,7 +120,7 @@ def _bytes(count: float) -> str:
 
 def _costs(simulation: Simulation) -> list[str]:
     case, fluid = simulation.case, simulation.model.fluid_model
-    unknowns = simulation.mechanics.unknowns
+    unknowns = simulation.system.unknowns
     lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
     lines += fluid.size()
     used = memory(simulation)

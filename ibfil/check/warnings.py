@@ -131,7 +131,7 @@ def _of_run(simulation: Simulation) -> list[str]:
         out.append(
             f"output.every: {every:g} is beyond time.end = {case.time.end:g}: only the start and the end are written"
         )
-    touching = simulation.rods.contact.diagnostics(simulation.shape.r).get("contacts", 0.0)
+    touching = simulation.rods.contact.diagnostics(simulation.configuration.r).get("contacts", 0.0)
     if touching:
         out.append(f"contact: {touching:.0f} pairs of segments touch at the start")
     return out

@@ -19,7 +19,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..linalg.constraints import Held
+from ..linalg.constraints import Prescribed
 
 Flow = Callable[[np.ndarray, float], np.ndarray]  # places (k, 3) and a time -> background velocity (k, 3)
 
@@ -31,7 +31,7 @@ class Part(NamedTuple):
     place: Callable[[np.ndarray], np.ndarray]
 
 
-class Answer(NamedTuple):
+class Solution(NamedTuple):
     """What a fluid returns, each (n, m): the move, the force the fluid felt, and what of it the supports gave."""
 
     move: np.ndarray
@@ -47,12 +47,12 @@ class Response(Protocol):
 
     keeps: bool
 
-    def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
+    def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements y = target + tau (u0 + M (force + R)); no stiffness."""
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
-    ) -> Answer:
+        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+    ) -> Solution:
         """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K a band matrix by node."""
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from ..linalg import banded
-from ..linalg.constraints import Held
+from ..linalg.constraints import Prescribed
 
 
 class Newton(NamedTuple):
@@ -26,7 +26,7 @@ class Newton(NamedTuple):
 
     force: np.ndarray
     stiffness: np.ndarray
-    held: Held
+    held: Prescribed
     y: np.ndarray
     target: np.ndarray
     tau: float
@@ -85,7 +85,7 @@ class Reduced(Protocol):
 class Condensation(Protocol):
     """Which unknowns go through the fluid; what the others do."""
 
-    def held_in_fluid(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
+    def held_in_fluid(self, held: Prescribed, m: int) -> tuple[np.ndarray, np.ndarray]:
         """Which of the held unknowns go through the fluid (bool), and where among those that do (flat)."""
 
     def reduced(self, newton: Newton) -> Reduced:
@@ -94,7 +94,9 @@ class Condensation(Protocol):
     def move_rest(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
         """Writes the displacements that do not go through the fluid into y (n, m), for given forces."""
 
-    def react_rest(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
+    def react_rest(
+        self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Prescribed, tau: float
+    ) -> np.ndarray:
         """Reactions (n, m) of supports that hold what does not go through the fluid."""
 
 
@@ -121,7 +123,7 @@ class _Whole:
 class NothingCondensed:
     """All unknowns of a node go through the fluid."""
 
-    def held_in_fluid(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
+    def held_in_fluid(self, held: Prescribed, m: int) -> tuple[np.ndarray, np.ndarray]:
         """All of them, where they are."""
         return np.ones(held.at.size, bool), held.at
 
@@ -132,7 +134,9 @@ class NothingCondensed:
     def move_rest(self, y: np.ndarray, force: np.ndarray, target: np.ndarray, tau: float) -> None:
         """Nothing is left to do."""
 
-    def react_rest(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
+    def react_rest(
+        self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Prescribed, tau: float
+    ) -> np.ndarray:
         """None."""
         return np.zeros(felt.shape)
 
@@ -203,7 +207,7 @@ class TwistCondensed:
     def __init__(self, drag: np.ndarray) -> None:
         self._drag = drag
 
-    def held_in_fluid(self, held: Held, m: int) -> tuple[np.ndarray, np.ndarray]:
+    def held_in_fluid(self, held: Prescribed, m: int) -> tuple[np.ndarray, np.ndarray]:
         """The positions, three a node."""
         node, part = held.at // m, held.at % m
         place = part < 3
@@ -217,7 +221,9 @@ class TwistCondensed:
         """Each against its own drag."""
         y[:, 3] = target[:, 3] + tau * force[:, 3] / self._drag
 
-    def react_rest(self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Held, tau: float) -> np.ndarray:
+    def react_rest(
+        self, y: np.ndarray, target: np.ndarray, felt: np.ndarray, held: Prescribed, tau: float
+    ) -> np.ndarray:
         """The torques of supports that hold e1."""
         out = np.zeros(felt.shape)
         at = held.at[held.at % 4 == 3] // 4

@@ -18,13 +18,13 @@ from .mobility_table import mobility, pairs, point_response
 
 
 class Coupling(Protocol):
-    """What of a node goes through the grid: ``parts`` numbers of it, c below, forces in and motions out.
+    """What of a node goes through the grid: ``components`` numbers of it, c below, forces in and motions out.
 
-    On the grid these are ``vectors`` vectors a node, v below: the force, and the torque with it.
+    On the grid these are ``grid_vectors`` vectors a node, v below: the force, and the torque with it.
     """
 
-    parts: int
-    vectors: int
+    components: int
+    grid_vectors: int
 
     def response(self, grid: Grid, viscosity: float, alpha: float) -> np.ndarray:
         """The grid's response (k, nx, ny, nz) to one cell's unit force, all components that a pair of nodes needs."""
@@ -43,13 +43,13 @@ class Coupling(Protocol):
     def axes(self, e3: np.ndarray) -> np.ndarray:
         """What nodes with tangents e3 (n, 3) spin about, (n, 3); zero where they do not."""
 
-    def lift(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def to_grid(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The vectors (n, 3 v) that go onto the grid, of forces (n, m), m at least c."""
 
-    def drop(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    def from_grid(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """The motions (n, c) from the vectors (n, 3 v) that come off the grid."""
 
-    def carried(self, flow: Flow, r: np.ndarray, axes: np.ndarray, time: float, h: float) -> np.ndarray:
+    def advected(self, flow: Flow, r: np.ndarray, axes: np.ndarray, time: float, h: float) -> np.ndarray:
         """The motions (n, c) of nodes that a background flow carries; h is the grid's spacing."""
 
 
@@ -74,7 +74,7 @@ class Nodes:
 class Translation:
     """Forces move nodes (immersed.Coupling): three numbers a node go through the grid, all of them vectors."""
 
-    parts, vectors = 3, 1
+    components, grid_vectors = 3, 1
 
     def response(self, grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
         """The velocity of a unit force on one cell."""
@@ -100,15 +100,15 @@ class Translation:
         """The tangents; no use is made of them."""
         return np.ascontiguousarray(e3)
 
-    def lift(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def to_grid(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The forces."""
         return np.ascontiguousarray(force[:, :3])
 
-    def drop(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    def from_grid(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """The velocities."""
         return motion
 
-    def carried(
+    def advected(
         self, flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, axes: np.ndarray, time: float, h: float
     ) -> np.ndarray:
         """The flow's velocity (n, 3)."""

@@ -22,6 +22,7 @@ from numba import njit
 from ..grid.fft import modes_of
 from ..grid.periodic_grid import Grid
 from ..grid.slab_fft import Block
+from ..grid.spectral import solenoidal
 from .advection import filters
 
 
@@ -53,10 +54,10 @@ def _fields(count: int, shape: tuple[int, ...], dtype: np.dtype) -> list[np.ndar
     """
     size, shift = math.prod(shape), 9 * 64 // dtype.itemsize
     rooms = [pyfftw.zeros_aligned(size + count * shift, dtype) for _ in range(count)]
-    return [room[k * shift : k * shift + size].reshape(shape) for k, room in enumerate(rooms)]
+    return [workspace[k * shift : k * shift + size].reshape(shape) for k, workspace in enumerate(rooms)]
 
 
-class Past:
+class History:
     """Velocities and advection (3, nx, ny, nz//2 + 1) at the last two steps.
 
     Kept in the type ``number``, double or single precision, and computed in double. Loops go over pairs of reals, which
@@ -75,22 +76,22 @@ class Past:
         self._scale, self._force_scale = density / (nx * ny * nz), 1.0 / (nx * ny * nz * grid.spacing**3)
         self._real, self.dt_old = np.dtype(number), 0.0
 
-    def coast(self, w: Weights, block: Block) -> None:
+    def predict(self, w: Weights, block: Block) -> None:
         """Into the first three fields of the block: the velocity at the end of a step without forces."""
         fields = (self._ahead, self.now, self.old, self.n_now, self.n_old)
         c, c_old = w.n_now * self._scale, w.n_old * self._scale
         reals = [field.view(self._real) for field in (block.modes, *fields)]
-        _coast(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, w.now, w.old, c, c_old)
+        _predict(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, w.now, w.old, c, c_old)
 
-    def push(self, w: Weights, block: Block, flow: np.ndarray) -> None:
+    def apply_forces(self, w: Weights, block: Block, flow: np.ndarray) -> None:
         """Adds what the forces, whose modes are in the block, do in the step asked about last.
 
         Leaves the velocity, filtered, and its vorticity in ``flow`` (6, nx, ny, nz//2 + 1).
         """
         reals = [field.view(self._real) for field in (block.modes, self._ahead, flow)]
-        _push(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, self._force_scale)
+        _apply_forces(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, self._force_scale)
 
-    def take_up(self, w: Weights) -> np.ndarray:
+    def commit(self, w: Weights) -> np.ndarray:
         """The step asked about last, all of it pushed, is the newest. Returns room for the modes of its omega x u."""
         self.now, self.old, self._ahead = self._ahead, self.now, self.old
         self.n_now, self.n_old = self.n_old, self.n_now
@@ -112,7 +113,7 @@ class Past:
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _coast(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, b, b_old, c, c_old):
+def _predict(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, b, b_old, c, c_old):
     """Pairs of reals a mode; kz, sz and fz twice each. s has the viscosity in it."""
     for i in range(i0, i0 + out.shape[1]):
         for j in range(j0, j0 + out.shape[2]):
@@ -122,12 +123,11 @@ def _coast(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz, f
                 u = c * n_now[0, i, j, k] + c_old * n_old[0, i, j, k]
                 v = c * n_now[1, i, j, k] + c_old * n_old[1, i, j, k]
                 w = c * n_now[2, i, j, k] + c_old * n_old[2, i, j, k]
-                square = d + kz[k] * kz[k]
-                g = (p * u + q * v + kz[k] * w) / square if square != 0.0 else 0.0
+                u, v, w = solenoidal(u, v, w, p, q, kz[k], d + kz[k] * kz[k])
                 f, r = e * fz[k], 1.0 / (s + sz[k])
-                u = r * (b * now[0, i, j, k] + b_old * old[0, i, j, k] + f * (u - p * g))
-                v = r * (b * now[1, i, j, k] + b_old * old[1, i, j, k] + f * (v - q * g))
-                w = r * (b * now[2, i, j, k] + b_old * old[2, i, j, k] + f * (w - kz[k] * g))
+                u = r * (b * now[0, i, j, k] + b_old * old[0, i, j, k] + f * u)
+                v = r * (b * now[1, i, j, k] + b_old * old[1, i, j, k] + f * v)
+                w = r * (b * now[2, i, j, k] + b_old * old[2, i, j, k] + f * w)
                 ahead[0, i, j, k] = out[0, i - i0, j - j0, k] = u
                 ahead[1, i, j, k] = out[1, i - i0, j - j0, k] = v
                 ahead[2, i, j, k] = out[2, i - i0, j - j0, k] = w
@@ -138,7 +138,7 @@ def _coast(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz, f
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _push(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, scale):
+def _apply_forces(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, scale):
     """Adds P force / (alpha + s) to ``ahead``; into ``flow`` that, filtered, and i k x of it."""
     for i in range(i0, i0 + force.shape[1]):
         for j in range(j0, j0 + force.shape[2]):
@@ -146,12 +146,11 @@ def _push(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha,
             p, q = kx[i], ky[j]
             for k in range(force.shape[3]):
                 u, v, w = force[0, i - i0, j - j0, k], force[1, i - i0, j - j0, k], force[2, i - i0, j - j0, k]
-                square = d + kz[k] * kz[k]
-                g = (p * u + q * v + kz[k] * w) / square if square != 0.0 else 0.0
+                u, v, w = solenoidal(u, v, w, p, q, kz[k], d + kz[k] * kz[k])
                 r = scale / (s + sz[k])
-                ahead[0, i, j, k] += r * (u - p * g)
-                ahead[1, i, j, k] += r * (v - q * g)
-                ahead[2, i, j, k] += r * (w - kz[k] * g)
+                ahead[0, i, j, k] += r * u
+                ahead[1, i, j, k] += r * v
+                ahead[2, i, j, k] += r * w
             for x in range(3):
                 for k in range(force.shape[3]):
                     flow[x, i, j, k] = e * fz[k] * ahead[x, i, j, k]

@@ -20,8 +20,8 @@ import numpy as np
 from ..grid.kernels import Kernel
 from ..grid.periodic_grid import Grid
 from ..linalg import banded
-from ..linalg.constraints import Held
-from .base import Answer, Flow
+from ..linalg.constraints import Prescribed
+from .base import Flow, Solution
 from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
 from .coupling import TRANSLATION, Coupling, Nodes
 
@@ -31,8 +31,8 @@ class Immersed:
     """What every grid fluid is made of: grid, kernel, eta, slip (n,), drag against spin (n,) or None, background flow.
 
     The drag is that of rods whose turns do not go through the grid; None where nothing twists or all goes through it.
-    ``rods`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is
-    the type of the mobility table's numbers and of the fields of a fluid with inertia, double or single precision
+    ``filaments`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number``
+    is the type of the mobility table's numbers and of the fields of a fluid with inertia, double or single precision
     (relative error about 1e-7).
     """
 
@@ -42,7 +42,7 @@ class Immersed:
     slip: np.ndarray
     spin_drag: np.ndarray | None
     flow: Flow | None = None
-    rods: tuple[slice, ...] = ()
+    filaments: tuple[slice, ...] = ()
     number: type = np.float64
     coupling: Coupling = TRANSLATION
 
@@ -64,11 +64,11 @@ class Immersed:
         """The nodes r (n, 3) with tangents e3 (n, 3) on the grid."""
         return Nodes(*self.stencil(r), self.coupling.axes(e3))
 
-    def carried(self, nodes: Nodes, r: np.ndarray, time: float) -> np.ndarray | None:
+    def advected(self, nodes: Nodes, r: np.ndarray, time: float) -> np.ndarray | None:
         """The motions (n, c) with which the background flow carries nodes at r (n, 3); None where there is none."""
         if self.flow is None:
             return None
-        return self.coupling.carried(self.flow, r, nodes.axes, time, self.grid.spacing)
+        return self.coupling.advected(self.flow, r, nodes.axes, time, self.grid.spacing)
 
 
 def slip_mobility(fraction: float, kernel: Kernel, grid: Grid, viscosity: float, volume: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ class ImmersedResponse(ABC):
     def __init__(self, immersed: Immersed, nodes: Nodes, flow: np.ndarray | None, tau: float) -> None:
         """``flow`` (n, c) are the motions that nodes have without any force, None where they have none."""
         self.immersed, self.nodes, self.flow, self.tau = immersed, nodes, flow, tau
-        self.parts = immersed.coupling.parts
+        self.components = immersed.coupling.components
 
     @abstractmethod
     def apply(self, force: np.ndarray) -> np.ndarray:
@@ -107,12 +107,12 @@ class ImmersedResponse(ABC):
         """x (c n,) with (1 - tau M K) x = right; at held unknowns columns of -tau M: forces are sought."""
 
     def _base(self, target: np.ndarray) -> np.ndarray:
-        base = target[:, : self.parts]
+        base = target[:, : self.components]
         return base.ravel() if self.flow is None else (base + self.tau * self.flow).ravel()
 
-    def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
+    def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """y = target + tau (u0 + M (force + R)), R such that held unknowns move as prescribed."""
-        condensation, (n, m), c = self.immersed.condensation, force.shape, self.parts
+        condensation, (n, m), c = self.immersed.condensation, force.shape, self.components
         reaction = np.zeros((n, m))
         move = self._base(target) + self.tau * self.apply(np.ascontiguousarray(force[:, :c]).ravel())
         here, index = condensation.held_in_fluid(held, m)
@@ -126,13 +126,13 @@ class ImmersedResponse(ABC):
         condensation.move_rest(y, force, target, self.tau)
         y.ravel()[held.at] = held.value
         reaction += condensation.react_rest(y, target, force, held, self.tau)
-        return Answer(y, force + reaction, reaction)
+        return Solution(y, force + reaction, reaction)
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
-    ) -> Answer:
+        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+    ) -> Solution:
         """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
-        condensation, c = self.immersed.condensation, self.parts
+        condensation, c = self.immersed.condensation, self.components
         statement = condensation.reduced(Newton(force, stiffness, held, y, target, self.tau))
         index = statement.index
         known = np.zeros(statement.force.size)
@@ -146,4 +146,4 @@ class ImmersedResponse(ABC):
         move = statement.whole(d)
         felt = force + banded.multiply(stiffness, move)
         reaction += condensation.react_rest(y + move, target, felt, held, self.tau)
-        return Answer(move, felt + reaction, reaction)
+        return Solution(move, felt + reaction, reaction)

@@ -27,7 +27,7 @@ class InertialFields(GridFields):
         self._fluid = fluid
 
     def _velocity(self, force: np.ndarray) -> np.ndarray:
-        return self._fluid.past.now.astype(complex)
+        return self._fluid.history.now.astype(complex)
 
     def _pressure(self, force: np.ndarray) -> np.ndarray:
         return super()._pressure(force) - self._dynamic().astype(np.float32)
@@ -36,7 +36,7 @@ class InertialFields(GridFields):
         """rho k.(u u)^.k/|k|^2, (nx, ny, nz)."""
         t, k, (fx, fy, fz) = self._transform, self._k, filters(self.grid)
         smooth = fx[:, None, None] * fy[:, None] * fz
-        t.modes[:] = self._fluid.past.now * smooth
+        t.modes[:] = self._fluid.history.now * smooth
         own = t.backward().copy()
         flow = np.zeros_like(own) if self.flow is None else self._fluid.background()[:3]
         square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2

@@ -18,13 +18,14 @@ from numba import njit
 from scipy.fft import irfftn
 
 from ..grid.periodic_grid import Grid
+from ..grid.spectral import StokesSymbol
 from ..linalg.vectors import NOT_NEGATIVE
 
 if TYPE_CHECKING:
     pass
 
 
-_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SIX = (0,) * 6
 
 
@@ -33,16 +34,10 @@ def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarr
 
     Unit force: density 1/h^3 on that cell. ``alpha`` (density over time) is zero in Stokes flow.
     """
-    (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
-    k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
-    total = alpha + viscosity * (sx[:, None, None] + sy[None, :, None] + sz[None, None, :])
-    total[0, 0, 0] = np.inf
-    square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
-    square[square == 0] = np.inf
-    out = np.empty((6, *grid.cells))
-    for c, (a, b) in enumerate(_COMPONENTS):
-        symbol = (float(a == b) - k[a] * k[b] / square) / (total * grid.spacing**3)
-        out[c] = irfftn(symbol, s=tuple(grid.cells), axes=(0, 1, 2))
+    symbol = StokesSymbol(*grid.wave_numbers(), viscosity, alpha)
+    total, out = symbol.total * grid.spacing**3, np.empty((6, *grid.cells))
+    for c, (a, b) in enumerate(COMPONENTS):
+        out[c] = irfftn(symbol.solenoidal(a, b) / total, s=tuple(grid.cells), axes=(0, 1, 2))
     return out
 
 

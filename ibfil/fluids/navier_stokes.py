@@ -4,7 +4,7 @@
 
     u = u0 + M F,    u0 = J (alpha + eta k^2)^-1 P (alpha b - N*),    M = J (alpha + eta k^2)^-1 P S,    alpha = rho/tau
 
-M is that of stokes.py with alpha in its symbol, by the same methods, made anew only where alpha changes. A background
+M is that of stokes.py with alpha in its symbol, by the same methods, made again only where alpha changes. A background
 flow U is maintained by whatever drives it: the fluid's own velocity is u' = u - U, from rest, and its advection
 N(U + u') - N(U).
 """
@@ -19,14 +19,14 @@ import numpy as np
 
 from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
-from ..grid.slab_fft import Block, Slab
+from ..grid.slab_fft import Block, SlabFFT
 from ..grid.spectral import half_curl
 from ..grid.spreading import interpolate
 from .advection import cross, cross_in
 from .background_flow import FIELDS, Background
 from .base import Response
 from .coupling import Nodes
-from .history import Past, Weights, weights
+from .history import History, Weights, weights
 from .immersed_boundary import Immersed, ImmersedResponse
 from .stokes import Tabulated
 
@@ -36,7 +36,7 @@ KEPT = 2  # operators: Euler's first step has another alpha than BDF2's
 COURANT = 1.0  # cells that the fastest fluid may cross in a step
 
 
-class Room:
+class Workspace:
     """Where fields are transformed; what it holds does not outlive a call, so others may use ``flow`` too.
 
     ``flow`` has FIELDS components. ``vectors`` of a node go through the grid: its force, and with two its torque.
@@ -45,31 +45,31 @@ class Room:
     def __init__(self, grid: Grid, vectors: int = 1, threads: int = 1, number: type = np.float64) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
         self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS, number=number)
-        self._slab = Slab((nx, ny, nz), 3 * vectors, threads, number)
-        self._stirs = vectors == 2
+        self._slab = SlabFFT((nx, ny, nz), 3 * vectors, threads, number)
+        self._couples_torque = vectors == 2
         (self._kx, self._ky, self._kz), _ = grid.wave_numbers()
 
     def _half_curl(self, block: Block, source: np.ndarray, target: np.ndarray) -> None:
         kx, ky = self._kx[block.i : block.i + source.shape[1]], self._ky[block.j : block.j + source.shape[2]]
         half_curl(source, kx, ky, self._kz, target)
 
-    def put(self, nodes: Nodes, vectors: np.ndarray) -> Iterator[Block]:
+    def scatter(self, nodes: Nodes, vectors: np.ndarray) -> Iterator[Block]:
         """The modes of what nodes put onto the grid, forces (n, 3), or forces and torques (n, 6): block by block."""
-        for block in self._slab.put(nodes.stencil, vectors):
-            if self._stirs:
+        for block in self._slab.scatter(nodes.stencil, vectors):
+            if self._couples_torque:
                 self._half_curl(block, block.modes[3:], block.modes[:3])
             yield block
 
-    def take(self, nodes: Nodes, velocity: Callable[[Block], None]) -> np.ndarray:
+    def gather(self, nodes: Nodes, velocity: Callable[[Block], None]) -> np.ndarray:
         """What nodes feel of the ``velocity`` that is put into each block: (n, 3), or half its vorticity too (n, 6)."""
 
         def modes(block: Block) -> None:
             velocity(block)
-            if self._stirs:
+            if self._couples_torque:
                 block.modes[3:] = 0.0
                 self._half_curl(block, block.modes[:3], block.modes[3:])
 
-        return self._slab.take(nodes.stencil, modes)
+        return self._slab.gather(nodes.stencil, modes)
 
 
 class _Asked(NamedTuple):
@@ -90,12 +90,12 @@ class NavierStokes:
         immersed: Immersed,
         density: float,
         operator: Callable[[float], Tabulated],
-        room: Room,
+        workspace: Workspace,
         background: Background | None = None,
     ) -> None:
         self.immersed, self.density = immersed, density
-        self.past = Past(immersed.grid, density, immersed.viscosity, immersed.number)
-        self._make, self.room, self._background = operator, room, background
+        self.history = History(immersed.grid, density, immersed.viscosity, immersed.number)
+        self._make, self.workspace, self._background = operator, workspace, background
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: _Asked | None = None
         self.time = 0.0
@@ -112,9 +112,9 @@ class NavierStokes:
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> ImmersedResponse:
         """The mobility over a step of effective length tau, and the velocity with which the fluid coasts into it."""
         alpha, operator = self._operator(self.density / tau)
-        nodes, past = self.immersed.nodes(r, e3), weights(alpha, tau, w, self.past.dt_old)
-        felt = self.room.take(nodes, partial(self.past.coast, past))
-        u0, flow = self.immersed.coupling.drop(nodes.axes, felt), self.immersed.carried(nodes, r, time)
+        nodes, past = self.immersed.nodes(r, e3), weights(alpha, tau, w, self.history.dt_old)
+        felt = self.workspace.gather(nodes, partial(self.history.predict, past))
+        u0, flow = self.immersed.coupling.from_grid(nodes.axes, felt), self.immersed.advected(nodes, r, time)
         response = operator.respond(nodes, u0 if flow is None else flow + u0, tau)
         self._asked = _Asked(response, past)
         return response
@@ -124,14 +124,14 @@ class NavierStokes:
         if self._asked is None or response is not self._asked.response:
             raise ValueError("a step that is taken must be the one the fluid was asked for last")
         nodes, past = self._asked.response.nodes, self._asked.weights
-        for block in self.room.put(nodes, self.immersed.coupling.lift(nodes.axes, force)):
-            self.past.push(past, block, self.room.flow.modes)
+        for block in self.workspace.scatter(nodes, self.immersed.coupling.to_grid(nodes.axes, force)):
+            self.history.apply_forces(past, block, self.workspace.flow.modes)
         self.time += past.dt
-        self._advect(self.past.take_up(past))
+        self._advect(self.history.commit(past))
 
     def _advect(self, out: np.ndarray) -> None:
         """Into ``out``, the modes of omega x u, of the velocity and vorticity whose modes the transform holds."""
-        t = self.room.flow
+        t = self.workspace.flow
         t.backward(FIELDS)
         if self._background is None:
             self.fastest = cross(t.real, 0.0)
@@ -153,17 +153,17 @@ class NavierStokes:
     ) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it; it is the fluid's present one."""
         immersed = self.immersed
-        self.room.flow.modes[:3] = self.past.now
-        u = interpolate(*immersed.stencil(points), self.room.flow.backward())
+        self.workspace.flow.modes[:3] = self.history.now
+        u = interpolate(*immersed.stencil(points), self.workspace.flow.backward())
         return u if immersed.flow is None else u + immersed.flow(points, time)
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """The past, and what the kept operators were made from."""
-        if self.past.dt_old == 0.0:
+        if self.history.dt_old == 0.0:
             return {}
         out: dict[str, np.ndarray | float] = {"time": self.time, "fastest": self.fastest}
         out["alphas"] = np.array([alpha for alpha, _ in self._operators])
-        out |= {f"past_{key}": value for key, value in self.past.memory().items()}
+        out |= {f"past_{key}": value for key, value in self.history.memory().items()}
         for k, (_, operator) in enumerate(self._operators):
             out |= {f"operator{k}_{key}": value for key, value in operator.memory().items()}
         return out
@@ -175,7 +175,7 @@ class NavierStokes:
             return {key.removeprefix(prefix): value for key, value in memory.items() if key.startswith(prefix)}
 
         self.time, self.fastest = float(memory["time"]), float(memory["fastest"])
-        self.past.recall(part("past_"))
+        self.history.recall(part("past_"))
         self._operators = [(float(alpha), self._make(float(alpha))) for alpha in np.asarray(memory["alphas"])]
         for k, (_, operator) in enumerate(self._operators):
             known = part(f"operator{k}_")

@@ -1,4 +1,4 @@
-"""What is put out of a fluid at an output: the heat it makes, and fields where it has a grid."""
+"""What is written of a fluid at an output: the heat it makes, and fields where it has a grid."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..rods.geometry import Geometry
+from ..rods.geometry import Configuration
 from .base import Flow
 from .coupling import Nodes
 from .fields import GridFields
@@ -15,15 +15,15 @@ from .immersed_boundary import Immersed
 
 
 class FluidOutput(Protocol):
-    """What a fluid puts out when nodes of a configuration move with ``velocity`` and push with ``force`` (n, m)."""
+    """What a fluid writes when nodes of a configuration move with ``velocity`` and push with ``force`` (n, m)."""
 
     def dissipation(
-        self, shape: Geometry, velocity: np.ndarray, force: np.ndarray, time: float
+        self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
     ) -> dict[str, float | np.ndarray]:
         """The power that it turns into heat, and what else is known of power, by name."""
 
     def evaluate(
-        self, shape: Geometry, force: np.ndarray, time: float, names: Sequence[str]
+        self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray] | None:
         """The fields in ``names`` on the grid, each (nx, ny, nz[, 3]); None where there is no grid."""
 
@@ -35,14 +35,14 @@ class DragOutput:
         self._flow = flow
 
     def dissipation(
-        self, shape: Geometry, velocity: np.ndarray, force: np.ndarray, time: float
+        self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
     ) -> dict[str, float | np.ndarray]:
         """F.(u - u0): what the rods do, less what they only hand on from the background flow."""
-        carried = 0.0 if self._flow is None else float(np.sum(force[:, :3] * self._flow(shape.r, time)))
+        carried = 0.0 if self._flow is None else float(np.sum(force[:, :3] * self._flow(configuration.r, time)))
         return {"dissipation": float(np.sum(velocity * force)) - carried}
 
     def evaluate(
-        self, shape: Geometry, force: np.ndarray, time: float, names: Sequence[str]
+        self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray] | None:
         """None: there is no flow between nodes."""
         return None
@@ -54,16 +54,16 @@ class GridOutput:
     def __init__(self, immersed: Immersed, fields: GridFields) -> None:
         self._immersed, self._fields = immersed, fields
 
-    def _pushes(self, shape: Geometry, force: np.ndarray) -> tuple[Nodes, np.ndarray]:
+    def _pushes(self, configuration: Configuration, force: np.ndarray) -> tuple[Nodes, np.ndarray]:
         """The nodes, and the vectors that they put onto the grid."""
-        nodes = self._immersed.nodes(shape.r, shape.e3)
-        return nodes, self._immersed.coupling.lift(nodes.axes, force)
+        nodes = self._immersed.nodes(configuration.r, configuration.e3)
+        return nodes, self._immersed.coupling.to_grid(nodes.axes, force)
 
     def dissipation(
-        self, shape: Geometry, velocity: np.ndarray, force: np.ndarray, time: float
+        self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
     ) -> dict[str, float | np.ndarray]:
         """The fluid's heat, the power of the nodes upon the grid, and what slip takes between the two."""
-        nodes, vectors = self._pushes(shape, force)
+        nodes, vectors = self._pushes(configuration, force)
         heat, power = self._fields.dissipation(*nodes.stencil, vectors)
         own = self._immersed.own
         return {
@@ -73,8 +73,8 @@ class GridOutput:
         }
 
     def evaluate(
-        self, shape: Geometry, force: np.ndarray, time: float, names: Sequence[str]
+        self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray] | None:
         """Fields on the grid: one evaluation of the fluid."""
-        nodes, vectors = self._pushes(shape, force)
+        nodes, vectors = self._pushes(configuration, force)
         return self._fields.evaluate(*nodes.stencil, vectors, time, names)

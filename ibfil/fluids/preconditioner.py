@@ -14,13 +14,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..linalg import gmres
-from ..linalg.gmres import CYCLE, Blocks, Product, Solution
+from ..linalg.gmres import CYCLE, Blocks, GmresResult, Product
 from .condensation import Reduced, RodStiffness
 from .coupling import Nodes
 
 _EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself
 _LOOSE = 1e-6  # and where it is not: less than Newton gains in an iteration by the time it stops
-_STIRRED = 0.01  # of that with torques: those that hold a turn, and turns in radians, outweigh moves by so much
+_WITH_TORQUES = 0.01  # of that with torques: those that hold a turn, and turns in radians, outweigh moves by so much
 _MOST = 5 * 60  # products of a solve, before it is given up
 _DRIFT = 0.4  # of tau, by which a kept preconditioner may be off: less than the change from Euler to BDF2
 _TRIAL = 8  # of so many preconditioners one is kept for longer, to find how long they serve
@@ -36,7 +36,7 @@ class KeptFactors:
     factors made at a step's second solve serve them. Factors are kept for as long as a round takes fewer products than
     the mean round since they were made, where that counts what making them cost (``cost``, in products): beyond it the
     mean would grow. The number of rounds found so (``life``) holds for the next factors, and every eighth are kept for
-    longer, to find it anew. Counts decide, never a clock.
+    longer, to find it again. Counts decide, never a clock.
     """
 
     cost: float
@@ -46,7 +46,7 @@ class KeptFactors:
     before: int = 0  # products of those rounds
     now: int = 0  # products of the present round
     fresh: int = 0  # products of the first solve with it
-    life: int = 1  # rounds after which it is made anew
+    life: int = 1  # rounds after which it is made again
     made: int = 0  # how often it was
 
     def renew(self, blocks: Blocks, tau: float) -> None:
@@ -55,7 +55,7 @@ class KeptFactors:
         self.made += 1
 
     def end_round(self) -> bool:
-        """Ends a round of solves; whether the factors should be made anew for the next."""
+        """Ends a round of solves; whether the factors should be made again for the next."""
         mean = (self.cost + self.before) / max(1, self.age)
         self.age += 1
         self.before += self.now
@@ -74,10 +74,10 @@ class KeptFactors:
 
     @property
     def patience(self) -> int:
-        """The products after which a solve is better gone on with by new factors."""
+        """The products after which a solve is better resumed by new factors."""
         return self.fresh + int(min(CYCLE, self.cost + 10))
 
-    def took(self, solution: Solution) -> None:
+    def took(self, solution: GmresResult) -> None:
         """Told what came of a solve."""
         self.now += solution.products
         self.fresh = self.fresh or solution.products
@@ -160,11 +160,11 @@ class RodByRod:
 
     keeps = False
 
-    def __init__(self, matrix: Matrix, rods: tuple[slice, ...], cost: float, stirs: bool) -> None:
-        """``cost``: what making the factors costs, in products; ``stirs``: torques are among the unknowns."""
+    def __init__(self, matrix: Matrix, rods: tuple[slice, ...], cost: float, couples_torque: bool) -> None:
+        """``cost``: what making the factors costs, in products; ``couples_torque``: torques are among the unknowns."""
         self._matrix, self._rods = matrix, rods
         self.kept = KeptFactors(cost)
-        self._tolerance = _STIRRED * _LOOSE if stirs else _LOOSE
+        self._tolerance = _WITH_TORQUES * _LOOSE if couples_torque else _LOOSE
         self._source: _Source | None = None
         self._solves = 0
 
@@ -208,7 +208,7 @@ class RodByRod:
         self.kept.recall({k: float(v) for k, v in memory.items() if not isinstance(v, np.ndarray)})
 
 
-def _checked(solution: Solution) -> np.ndarray:
+def _checked(solution: GmresResult) -> np.ndarray:
     if not solution.found:
         raise np.linalg.LinAlgError(f"GMRES found no solution in {solution.products} products with the FFT operator")
     return solution.x

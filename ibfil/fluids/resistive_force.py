@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 
 from ..linalg import banded
-from ..linalg.constraints import Held
+from ..linalg.constraints import Prescribed
 from ..linalg.vectors import at, dot, mix, put
-from .base import Answer, Flow, Memoryless
+from .base import Flow, Memoryless, Solution
 
 
 class Drag(NamedTuple):
@@ -104,16 +104,16 @@ class _Response:
         base[:, :3] += self.tau * self.flow
         return base
 
-    def forced(self, force: np.ndarray, held: Held, target: np.ndarray) -> Answer:
+    def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         base = self._velocity_target(target)
         y = base + self.tau * mobilize(self.drag, self.e3, force)
         y.ravel()[held.at] = held.value
         felt = resist(self.drag, self.e3, (y - base) / self.tau)
-        return Answer(y, felt, _at(held, felt - force))
+        return Solution(y, felt, _at(held, felt - force))
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Held, y: np.ndarray, target: np.ndarray
-    ) -> Answer:
+        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+    ) -> Solution:
         """(K - Z/tau) d = Z/tau (y - target) - Z u0 - f; uses ``stiffness`` up."""
         base = self._velocity_target(target)
         moved, m, inverse = y - base, force.shape[1], 1.0 / self.tau
@@ -129,13 +129,13 @@ class _Response:
             d = banded.solve_pivoted(stiffness, right)
             felt = resist(self.drag, self.e3, (moved + d) * inverse)
         if not nodes.size:
-            return Answer(d, felt, np.zeros(d.shape))
+            return Solution(d, felt, np.zeros(d.shape))
         rest = felt - force
         rest[nodes] -= _rows_times(rows, nodes, d)
-        return Answer(d, felt, _at(held, rest))
+        return Solution(d, felt, _at(held, rest))
 
 
-def _at(held: Held, values: np.ndarray) -> np.ndarray:
+def _at(held: Prescribed, values: np.ndarray) -> np.ndarray:
     """``values`` at the held unknowns, zero elsewhere."""
     out = np.zeros_like(values)
     out.ravel()[held.at] = values.ravel()[held.at]

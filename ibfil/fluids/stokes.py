@@ -119,7 +119,7 @@ class Tabulated(Memoryless, ABC):
     ) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of forces (n, m) at r (n, 3)."""
         immersed, k, n = self.immersed, len(points), len(r)
-        coupling, c = immersed.coupling, immersed.coupling.parts
+        coupling, c = immersed.coupling, immersed.coupling.components
         axes = np.concatenate([np.zeros_like(points), coupling.axes(e3)])
         nodes = Nodes(*immersed.stencil(np.concatenate([points, r])), axes)
         rows, columns = np.arange(k), np.arange(k, k + n)
@@ -130,7 +130,7 @@ class Tabulated(Memoryless, ABC):
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> ImmersedResponse:
         """The mobility of nodes r (n, 3) with tangents e3 (n, 3), in the background flow of ``time``."""
         nodes = self.immersed.nodes(r, e3)
-        return self.respond(nodes, self.immersed.carried(nodes, r, time), tau)
+        return self.respond(nodes, self.immersed.advected(nodes, r, time), tau)
 
     @abstractmethod
     def respond(self, nodes: Nodes, flow: np.ndarray | None, tau: float) -> ImmersedResponse:
@@ -175,15 +175,15 @@ class _Fourier(ImmersedResponse):
         self.keeps = preconditioner.keeps
 
     def apply(self, force: np.ndarray) -> np.ndarray:
-        f, nodes, coupling = force.reshape(-1, self.parts), self.nodes, self.immersed.coupling
-        moved = self._solver.velocity(nodes.base, nodes.weights, coupling.lift(nodes.axes, f))
-        return (coupling.drop(nodes.axes, moved) + self.immersed.own * f).ravel()
+        f, nodes, coupling = force.reshape(-1, self.components), self.nodes, self.immersed.coupling
+        moved = self._solver.velocity(nodes.base, nodes.weights, coupling.to_grid(nodes.axes, f))
+        return (coupling.from_grid(nodes.axes, moved) + self.immersed.own * f).ravel()
 
     def columns(self, index: np.ndarray) -> np.ndarray:
-        nodes, parts = index // self.parts, index % self.parts
+        nodes, components = index // self.components, index % self.components
         held = np.unique(nodes)
         block = self._block(self.nodes, np.arange(len(self.nodes.axes)), held)
-        return block[:, self.parts * np.searchsorted(held, nodes) + parts]
+        return block[:, self.components * np.searchsorted(held, nodes) + components]
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         free, index = statement.free, statement.index
@@ -213,7 +213,7 @@ class StokesByFFT(Tabulated):
 
     def _exact(self) -> Matrix:
         """The exact matrices of nodes."""
-        return Matrix(self.matrix, self.immersed.own, self.immersed.coupling.parts)
+        return Matrix(self.matrix, self.immersed.own, self.immersed.coupling.components)
 
 
 class StokesByKrylov(StokesByFFT):
@@ -224,7 +224,7 @@ class StokesByKrylov(StokesByFFT):
 
     def __init__(self, immersed: Immersed, solver: Solver, cost: float, alpha: float = 0.0) -> None:
         super().__init__(immersed, solver, alpha)
-        self.kept = RodByRod(self._exact(), immersed.rods, cost, stirs=immersed.coupling.vectors > 1)
+        self.kept = RodByRod(self._exact(), immersed.filaments, cost, couples_torque=immersed.coupling.grid_vectors > 1)
 
     def _preconditioner(self) -> Preconditioner:
         self.kept.begin()

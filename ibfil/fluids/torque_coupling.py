@@ -38,9 +38,9 @@ from scipy.fft import irfftn
 
 from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
-from ..grid.spectral import half_curl, project
+from ..grid.spectral import StokesSymbol, half_curl, project
 from ..grid.spreading import interpolate, spread
-from .mobility_table import point_response, sum_pair
+from .mobility_table import COMPONENTS, point_response, sum_pair
 
 if TYPE_CHECKING:
     from .coupling import Nodes
@@ -51,16 +51,11 @@ _FIFTEEN = (0,) * 15  # G xx .. yz, R x y z, W xx .. yz
 
 def torque_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
     """R (x, y, z) and W (xx, yy, zz, xy, xz, yz) of a unit torque on one cell, as (9, nx, ny, nz)."""
-    (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
-    k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
-    total = alpha + viscosity * (sx[:, None, None] + sy[None, :, None] + sz[None, None, :])
-    total[0, 0, 0] = np.inf
-    total *= grid.spacing**3
-    square = k[0] ** 2 + k[1] ** 2 + k[2] ** 2
-    symbols = [0.5j * k[a] / total for a in range(3)]
-    for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
-        symbols.append(0.25 * (float(a == b) * square - k[a] * k[b]) / total)
-    return np.stack([irfftn(symbol, s=tuple(grid.cells), axes=(0, 1, 2)) for symbol in symbols])
+    symbol = StokesSymbol(*grid.wave_numbers(), viscosity, alpha)
+    total = symbol.total * grid.spacing**3
+    symbols = [0.5j * symbol.k[a] / total for a in range(3)]
+    symbols += [0.25 * symbol.twice_curled(a, b) / total for a, b in COMPONENTS]
+    return np.stack([irfftn(one, s=tuple(grid.cells), axes=(0, 1, 2)) for one in symbols])
 
 
 @njit(cache=True, inline="always")
@@ -208,7 +203,7 @@ class TorqueCoupling:
     and zero where it does not: there a torque acts on the node's own spin only, and stirs nothing.
     """
 
-    parts, vectors = 4, 2
+    components, grid_vectors = 4, 2
 
     def __init__(self, spin: np.ndarray, twists: np.ndarray) -> None:
         self.spin, self.twists = spin, twists
@@ -237,19 +232,19 @@ class TorqueCoupling:
         """What nodes with tangents e3 (n, 3) spin about, (n, 3)."""
         return self.twists[:, None] * e3
 
-    def lift(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def to_grid(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Forces and torques (n, 6)."""
         return np.hstack([force[:, :3], force[:, 3:] * axes])
 
-    def drop(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    def from_grid(self, axes: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Velocities and spins (n, 4)."""
         return np.column_stack([motion[:, :3], np.sum(motion[:, 3:] * axes, axis=1)])
 
-    def carried(
+    def advected(
         self, flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, axes: np.ndarray, time: float, h: float
     ) -> np.ndarray:
         """The flow's velocity and its spin about the tangents, (n, 4)."""
-        return self.drop(axes, np.hstack([flow(r, time), 0.5 * curl(flow, r, time, h)]))
+        return self.from_grid(axes, np.hstack([flow(r, time), 0.5 * curl(flow, r, time, h)]))
 
 
 def curl(flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, time: float, h: float) -> np.ndarray:

@@ -21,7 +21,7 @@ from numba import njit
 
 from .fft import useful_threads
 from .periodic_grid import Grid
-from .spectral import project
+from .spectral import StokesSymbol, project
 from .spreading import interpolate, spread
 
 _CACHE = 2**20  # bytes of a block of the third pass: what stays near the processor
@@ -134,16 +134,11 @@ class _Planes:
     """The third pass of a thin box: sums over its planes."""
 
     def __init__(self, ks: list[np.ndarray], squares: list[np.ndarray], planes: int, viscosity: float, scale: float):
-        kc, kb, ka = ks[0][:, None, None], ks[1][None, :, None], ks[2][None, None, :]
-        total = viscosity * (squares[0][:, None, None] + squares[1][None, :, None] + squares[2][None, None, :])
-        total[0, 0, 0] = np.inf
-        square = kc**2 + kb**2 + ka**2
-        square[square == 0] = np.inf
-        k = (kc, kb, ka)
-        self.table = np.empty((total.shape[1], planes, 6, 2 * total.shape[2]))
+        symbol = StokesSymbol(ks, squares, viscosity)
+        self.table = np.empty((symbol.total.shape[1], planes, 6, 2 * symbol.total.shape[2]))
         # CC, BB, AA, CB, CA, BA; what is odd in k_C comes out imaginary and odd in the distance
         for c, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-            line = np.fft.ifft(scale * (float(a == b) - k[a] * k[b] / square) / total, axis=0)[:planes]
+            line = np.fft.ifft(scale * symbol.solenoidal(a, b) / symbol.total, axis=0)[:planes]
             part = line.imag if c in (3, 4) else line.real
             self.table[:, :, c] = np.repeat(np.moveaxis(part, 0, 1), 2, axis=2)
 

@@ -58,7 +58,7 @@ class _Cut(NamedTuple):
         return field if self.axis == 1 else field.swapaxes(1, 2)
 
 
-class Slab:
+class SlabFFT:
     """Takes ``fields`` components of what nodes put onto a grid of ``cells`` to modes, and modes to what nodes feel.
 
     ``number`` is the type of the fields, double or single precision.
@@ -118,7 +118,7 @@ class Slab:
         for first in range(0, self._cells[1 - axis], lines):
             yield slice(first, first + lines), Block(room, *((0, first) if axis == 0 else (first, 0)))
 
-    def put(self, nodes: Stencil, vectors: np.ndarray) -> Iterator[Block]:
+    def scatter(self, nodes: Stencil, vectors: np.ndarray) -> Iterator[Block]:
         """All modes of vectors (n, fields) spread to the grid, a block after the other."""
         cut = self._cut(nodes)
         planes, (room, forward, _) = self._room(cut.axis, cut.planes), self._lines(cut.axis)
@@ -134,7 +134,7 @@ class Slab:
             forward.execute()
             yield block
 
-    def take(self, nodes: Stencil, modes: Callable[[Block], None]) -> np.ndarray:
+    def gather(self, nodes: Stencil, modes: Callable[[Block], None]) -> np.ndarray:
         """What nodes feel, (n, fields), of the field whose modes ``modes`` puts into each block."""
         cut = self._cut(nodes)
         planes, (room, _, backward) = self._room(cut.axis, cut.planes), self._lines(cut.axis)

@@ -75,8 +75,8 @@ def read(path: Path) -> Checkpoint:
                 raise ValueError(FORMAT)
             if file.attrs["format_version"] != FORMAT_VERSION:
                 found = f"is a checkpoint of format {int(file.attrs['format_version'])}"
-                cure = "go on with the ibfil that `ibfil show` says the run was written by"
-                raise RunFileError(f"{path}: {found}; this ibfil goes on from format {FORMAT_VERSION}: {cure}")
+                remedy = "go on with the ibfil that `ibfil show` says the run was written by"
+                raise RunFileError(f"{path}: {found}; this ibfil goes on from format {FORMAT_VERSION}: {remedy}")
             state: dict[str, Any] = {}
             file["state"].visititems(lambda key, item: _get(state, key, item))
             scalars = {name: file.attrs[name] for name in _SCALARS}

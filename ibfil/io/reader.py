@@ -21,8 +21,8 @@ import numpy as np
 
 from ..errors import CaseError
 from . import journal
-from .frames import FilamentFrame, Frame
 from .pace import pace_of
+from .snapshots import FilamentSnapshot, Snapshot
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
@@ -90,7 +90,7 @@ class Column:
 
 
 class GridRecord(NamedTuple):
-    """The fields that were put out: value [g, i, j, k] lies at origin + spacing (i, j, k), at time[g]."""
+    """The fields that were written: value [g, i, j, k] lies at origin + spacing (i, j, k), at time[g]."""
 
     time: Column
     fields: dict[str, Column]  # (G, nx, ny, nz) or (G, nx, ny, nz, 3)
@@ -169,7 +169,7 @@ class RunFile:
 
     @cached_property
     def grid(self) -> GridRecord | None:
-        """The fields, None where none were put out."""
+        """The fields, None where none were written."""
         if "grid" not in self._file:
             return None
         group = self._file["grid"]
@@ -283,11 +283,11 @@ class RunFile:
         """Shows every group and dataset of the file."""
         self._file.visititems(look)
 
-    def frame(self, i: int) -> Frame:
+    def snapshot(self, i: int) -> Snapshot:
         """Output ``i`` as the simulation gave it (without fields)."""
-        return next(self.frames(i % self._rows))
+        return next(self.snapshots(i % self._rows))
 
-    def frames(self, start: int = 0, stop: int | None = None) -> Iterator[Frame]:
+    def snapshots(self, start: int = 0, stop: int | None = None) -> Iterator[Snapshot]:
         """Yield outputs ``start`` to ``stop``, read in blocks."""
         stop = self._rows if stop is None else min(stop, self._rows)
         for low in range(start, stop, _BLOCK):
@@ -295,16 +295,16 @@ class RunFile:
             filaments = {n: {k: c[block] for k, c in columns.items()} for n, columns in self.filaments.items()}
             diagnostics = {name: column[block] for name, column in self.diagnostics.items()}
             for i, time in enumerate(self.time[block]):
-                yield Frame(
+                yield Snapshot(
                     time=float(time),
-                    filaments={name: _filament_frame(arrays, i) for name, arrays in filaments.items()},
+                    filaments={name: _filament_snapshot(arrays, i) for name, arrays in filaments.items()},
                     diagnostics={k: float(v[i]) if v.ndim == 1 else v[i] for k, v in diagnostics.items()},
                 )
 
 
-def _filament_frame(arrays: dict[str, np.ndarray], i: int) -> FilamentFrame:
+def _filament_snapshot(arrays: dict[str, np.ndarray], i: int) -> FilamentSnapshot:
     values: dict[str, Any] = {key: arrays[key][i] if key in arrays else None for key in _KEYS}
-    return FilamentFrame(**values)
+    return FilamentSnapshot(**values)
 
 
 def _open(path: Path) -> h5py.File:
@@ -346,10 +346,10 @@ def _check_format(file: h5py.File, path: Path) -> None:
 def other_format(version: int, written_by: str) -> str:
     """What to do with a file of another format version."""
     if version > FORMAT_VERSION:
-        cure = f"read it with ibfil {written_by} or later (pip install -U ibfil)"
+        remedy = f"read it with ibfil {written_by} or later (pip install -U ibfil)"
     else:
-        cure = f"read it with ibfil {written_by}, or run its case again (it is in the attribute `case`)"
-    return f"has format {version}, written by ibfil {written_by}; this ibfil reads format {FORMAT_VERSION}: {cure}"
+        remedy = f"read it with ibfil {written_by}, or run its case again (it is in the attribute `case`)"
+    return f"has format {version}, written by ibfil {written_by}; this ibfil reads format {FORMAT_VERSION}: {remedy}"
 
 
 def damaged(path: Path) -> str:

@@ -19,11 +19,11 @@ import h5py
 import numpy as np
 
 from ..errors import RunFailed
-from .frames import Frame
 from .journal import Busy, JournaledFile
 from .pace import pace_of
 from .provenance import about, now
 from .reader import RunFileError, checkpoint_path, journal_path
+from .snapshots import Snapshot
 from .units import label
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class Meaning(NamedTuple):
 
 
 class GridPlace(NamedTuple):
-    """Where grid index (0, 0, 0) lies, the distance of grid points, and every how many-th is put out."""
+    """Where grid index (0, 0, 0) lies, the distance of grid points, and every how many-th is written."""
 
     origin: np.ndarray
     spacing: float
@@ -105,7 +105,7 @@ class Recorder:
         cls,
         path: Path,
         case: Case,
-        frame: Frame,
+        snapshot: Snapshot,
         series: Mapping[str, Any],
         meanings: Mapping[str, Meaning],
         *,
@@ -134,10 +134,10 @@ class Recorder:
             self._h5.attrs.update(about(case, method, wisdom, groups))
             for group in ("filaments", "observables", "diagnostics"):
                 self._h5.create_group(group)
-            for name, value in _rows(frame, series).items():
+            for name, value in _rows(snapshot, series).items():
                 shape = np.asarray(value, float).shape
                 self._columns[name] = self._add(name, shape, _meaning(name, meanings), expected)
-            self.append(frame, series)
+            self.append(snapshot, series)
             self.write()
         return self
 
@@ -180,9 +180,9 @@ class Recorder:
         assert self._h5 is not None
         return self._h5
 
-    def append(self, frame: Frame, series: Mapping[str, Any]) -> None:
+    def append(self, snapshot: Snapshot, series: Mapping[str, Any]) -> None:
         """One output. Arrays are copied: the simulation may go on in the same memory."""
-        rows = _rows(frame, series)
+        rows = _rows(snapshot, series)
         strange = [name for name in rows if name not in self._columns]
         if strange:
             raise ValueError(f"{strange[0]} was not in the first output")
@@ -349,16 +349,16 @@ def _owned(path: Path) -> Iterator[None]:
         raise RunFileError(f"{path}: is being written by another ibfil that is still running") from None
 
 
-def _rows(frame: Frame, series: Mapping[str, Any]) -> dict[str, Any]:
+def _rows(snapshot: Snapshot, series: Mapping[str, Any]) -> dict[str, Any]:
     """Dataset -> value of one output."""
-    rows: dict[str, Any] = {"time": frame.time}
-    for name, filament in frame.filaments.items():
+    rows: dict[str, Any] = {"time": snapshot.time}
+    for name, filament in snapshot.filaments.items():
         for field in fields_of(filament):
             value = getattr(filament, field.name)
             if value is not None:
                 rows[f"filaments/{name}/{field.name}"] = value
     rows |= {f"observables/{name}": value for name, value in series.items()}
-    return rows | {f"diagnostics/{name}": value for name, value in frame.diagnostics.items()}
+    return rows | {f"diagnostics/{name}": value for name, value in snapshot.diagnostics.items()}
 
 
 def _meaning(name: str, observables: Mapping[str, Meaning]) -> Meaning:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Held(NamedTuple):
+class Prescribed(NamedTuple):
     """The unknowns that are prescribed over a step: flat indices node * m + component (k,), and their y (k,)."""
 
     at: np.ndarray

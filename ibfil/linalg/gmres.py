@@ -69,7 +69,7 @@ def factored(parts: list[tuple[slice, np.ndarray]], held: np.ndarray) -> Blocks:
     return Blocks([(at, factor(system)) for at, system in parts], scale)
 
 
-class Solution(NamedTuple):
+class GmresResult(NamedTuple):
     """What GMRES found: x (n,), how many products it took, and whether x is within the tolerance."""
 
     x: np.ndarray
@@ -77,7 +77,7 @@ class Solution(NamedTuple):
     found: bool
 
 
-def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float, most: int) -> Solution:
+def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float, most: int) -> GmresResult:
     """x with product(x) = right to the relative error ``tolerance``, in some ``most`` products.
 
     Where rounding does not let it come so far, 1e-6 will do.
@@ -100,4 +100,4 @@ def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float,
         callback_type="pr_norm",
     )
     found = bool(np.isfinite(z).all()) and (not failed or errors[-1] < _WORST)
-    return Solution(blocks.scale * z, count, found)
+    return GmresResult(blocks.scale * z, count, found)

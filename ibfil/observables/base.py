@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from ..io.frames import Frame
+from ..io.snapshots import Snapshot
 from . import time_series
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Observable(Protocol):
         """Of the series, in words."""
         ...
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """Value at this output."""
         ...
 
@@ -93,7 +93,7 @@ _SUMMARIES = {
 }
 
 
-class Kind:
+class ObservableBase:
     """What the kinds of case files share: the keys `along`, `over` and `summary`. A kind adds ``sample``.
 
     ``keys`` are those that mean something to it; any other is refused. ``over`` is the window or None,
@@ -132,7 +132,7 @@ class Kind:
         what = f"{self.number or how + type(self).description} of {observe.filament}"
         self.words = ", ".join([what, *details, *over])
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """Value at one output."""
         raise NotImplementedError
 
@@ -152,7 +152,7 @@ class Kind:
         return plain(_SUMMARIES[self._how].of(times, samples, start, end))
 
 
-KINDS: dict[str, type[Kind]] = {}
+KINDS: dict[str, type[ObservableBase]] = {}
 
 
 def plain(value: np.ndarray) -> Value:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from ..errors import CaseError
 from .base import KINDS, Observable, Unfit
-from .observers import Observers
+from .observers import ObservableSet
 
 if TYPE_CHECKING:
     from ..case.schema import Case
 
 
-def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Observers:
+def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> ObservableSet:
     """Make the observables of a case, and take in ``extra`` ones made in Python.
 
     Raises CaseError, a line for each observable or stop rule that asks for what its kind does not have.
@@ -34,7 +34,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
         faults = stop_faults(case, made)
     if faults:
         raise CaseError(faults)
-    return Observers(made)
+    return ObservableSet(made)
 
 
 def kinds_text() -> str:

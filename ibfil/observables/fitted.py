@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..io.frames import Frame
+from ..io.snapshots import Snapshot
 from . import time_series
 from .base import Unfit, Value, plain
 from .local import Amplitude, AtPlace, Component, OfFilament
-from .place import Place
+from .location import Location
 
 if TYPE_CHECKING:
     from ..case.schema import Case, Observe
@@ -34,9 +34,9 @@ class Drift(Component, kind="drift"):
     description = "position"
     number = "drift (displacement over time)"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        return self.reduce(self.look(frame).position)
+        return self.reduce(self.look(snapshot).position)
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the mean velocity over `over`."""
@@ -95,9 +95,9 @@ class Circularity(AcrossAxis, kind="circularity"):
     description = "position"
     number = "circularity of the path"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        return self.point(self.look(frame).position)
+        return self.point(self.look(snapshot).position)
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the ratio over `over`."""
@@ -120,11 +120,11 @@ class Frequency(AcrossAxis, kind="frequency"):
 
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)
-        self._centre = Place(self.s, _CENTRES.get(str(self.at), "start"))
+        self._centre = Location(self.s, _CENTRES.get(str(self.at), "start"))
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        position = self.look(frame).position
+        position = self.look(snapshot).position
         return self.point(position) - self._centre.values(position)[0]
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
@@ -154,9 +154,9 @@ class DiffusionRatio(AtPlace, kind="diffusion_ratio"):
         self._past: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
         self._along = self._across = 0.0
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """Return the ratio of all intervals that have ended."""
-        position, time, past = self.look(frame).position, frame.time, self._past
+        position, time, past = self.look(snapshot).position, snapshot.time, self._past
         begin, slack = time - self.lag, 1e-6 * self.lag
         while past and past[0][0] < begin - slack:
             past.popleft()
@@ -198,9 +198,9 @@ class Efficiency(OfFilament, kind="efficiency"):
         self._before = (0.0, 0.0)  # time and power at the last output
         self._work = 0.0
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """Return the efficiency since the start of `over`."""
-        filament, time = self.look(frame), frame.time
+        filament, time = self.look(snapshot), snapshot.time
         centroid = self.share @ filament.position
         power = float(np.sum(filament.power))
         last, self._before = self._before, (time, power)

@@ -13,9 +13,9 @@ import numpy as np
 from ..case.filament import single
 from ..case.spacing import node_arclength
 from ..errors import CaseError
-from ..io.frames import FilamentFrame, Frame
-from .base import Kind, Unfit, Value
-from .place import Place, reduced
+from ..io.snapshots import FilamentSnapshot, Snapshot
+from .base import ObservableBase, Unfit, Value
+from .location import Location, reduced
 from .time_series import trapezoid_weights
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ MEANS, WINDOWS = ("mean",), ("mean", "max", "min")  # what may be asked of the p
 SUPPORTS = {"start": (-1.0, 0), "finish": (1.0, -1)}  # sign of the moment that a support gives, and its node
 
 
-class OfFilament(Kind):
+class OfFilament(ObservableBase):
     """A kind that looks at one filament; ``s`` (N,) is its arclength."""
 
     def __init__(self, case: Case, observe: Observe) -> None:
@@ -41,12 +41,12 @@ class OfFilament(Kind):
         self.length, self.s = filament.length, node_arclength(filament)
         self.share = trapezoid_weights(self.s) / self.length  # (N,) of each node in the filament
 
-    def look(self, frame: Frame) -> FilamentFrame:
+    def look(self, snapshot: Snapshot) -> FilamentSnapshot:
         """Return this filament at one output. Raises CaseError for a copy beyond those that a file has placed."""
-        if self.filament not in frame.filaments:
-            names = list(frame.filaments)
+        if self.filament not in snapshot.filaments:
+            names = list(snapshot.filaments)
             raise CaseError([f'an observable: filament: found "{self.filament}"; allowed: {names[0]} to {names[-1]}'])
-        return frame.filaments[self.filament]
+        return snapshot.filaments[self.filament]
 
 
 class AtPlace(OfFilament):
@@ -68,11 +68,11 @@ class AtPlace(OfFilament):
             words = '"mean"' if mean_only else '"mean", "max" or "min"'
             more = "" if self.mean_only or not self.vector else '; "max" and "min" with `along`'
             raise Unfit("space", self.space, f"{words} where `at` is a window{more}")
-        self.place = Place(self.s, self.at)
+        self.location = Location(self.s, self.at)
 
     def point(self, field: np.ndarray) -> np.ndarray:
         """Return a nodal field (N, 3) at the point, or its mean over the window: (3,)."""
-        return self.place.reduced(self.place.values(field), "mean")
+        return self.location.reduced(self.location.values(field), "mean")
 
 
 class Component(AtPlace):
@@ -89,7 +89,7 @@ class Component(AtPlace):
         """Return the component (or vector) of a nodal field (N, 3) at the place."""
         if self.axis is None:
             return self.point(field)
-        return float(self.place.reduced(self.place.values(field @ self.axis), self.space))
+        return float(self.location.reduced(self.location.values(field @ self.axis), self.space))
 
 
 class Position(Component, kind="position"):
@@ -98,9 +98,9 @@ class Position(Component, kind="position"):
     dimension = "length"
     description = "position"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        return self.reduce(self.look(frame).position)
+        return self.reduce(self.look(snapshot).position)
 
 
 class Velocity(Component, kind="velocity"):
@@ -109,9 +109,9 @@ class Velocity(Component, kind="velocity"):
     dimension = "length/time"
     description = "velocity"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        return self.reduce(self.look(frame).velocity)
+        return self.reduce(self.look(snapshot).velocity)
 
 
 class Displacement(Component, kind="displacement"):
@@ -124,9 +124,9 @@ class Displacement(Component, kind="displacement"):
         super().__init__(case, observe)
         self._first: np.ndarray | None = None
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        position = self.look(frame).position
+        position = self.look(snapshot).position
         if self._first is None:
             self._first = position.copy()
         return self.reduce(position - self._first)
@@ -138,10 +138,10 @@ class Speed(AtPlace, kind="speed"):
     dimension = "length/time"
     description = "speed"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        values = np.linalg.norm(self.place.values(self.look(frame).velocity), axis=1)
-        return float(self.place.reduced(values, self.space))
+        values = np.linalg.norm(self.location.values(self.look(snapshot).velocity), axis=1)
+        return float(self.location.reduced(values, self.space))
 
 
 class Amplitude(AtPlace, kind="amplitude"):
@@ -152,11 +152,11 @@ class Amplitude(AtPlace, kind="amplitude"):
     dimension = "length"
     description = "distance from the line through the start"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        position = self.look(frame).position
-        across = _distance_across(self.place.values(position) - position[0], self.axis)
-        return float(self.place.reduced(across, self.space))
+        position = self.look(snapshot).position
+        across = _distance_across(self.location.values(position) - position[0], self.axis)
+        return float(self.location.reduced(across, self.space))
 
 
 class Twist(AtPlace, kind="twist"):
@@ -166,10 +166,10 @@ class Twist(AtPlace, kind="twist"):
     dimension = "rad/length"
     description = "twist Omega_3"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        values = self.place.values(self.look(frame).strain[:, 2])
-        return float(self.place.reduced(values, self.space))
+        values = self.location.values(self.look(snapshot).strain[:, 2])
+        return float(self.location.reduced(values, self.space))
 
 
 class Stretch(AtPlace, kind="stretch"):
@@ -194,9 +194,9 @@ class Stretch(AtPlace, kind="stretch"):
             where = float(named[self.at] if isinstance(self.at, str) else self.at)
             self.chosen = np.array([min(int(np.searchsorted(self.s[1:], where)), len(self.ds) - 1)])
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        lengths = np.linalg.norm(np.diff(self.look(frame).position, axis=0), axis=1)
+        lengths = np.linalg.norm(np.diff(self.look(snapshot).position, axis=0), axis=1)
         values, weights = (lengths / self.ds - 1.0)[self.chosen], self.ds[self.chosen]
         return float(reduced(self.space, weights / weights.sum(), values))
 
@@ -208,9 +208,9 @@ class EndToEnd(OfFilament, kind="end_to_end"):
     dimension = "length"
     description = "distance of the two ends"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        position = self.look(frame).position
+        position = self.look(snapshot).position
         return float(np.linalg.norm(position[-1] - position[0]))
 
 
@@ -230,9 +230,9 @@ class TurnAngle(OfFilament, kind="turn_angle"):
         self._first: np.ndarray | None = None
         self._last = 0.0
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        position = self.look(frame).position
+        position = self.look(snapshot).position
         chord = position[-1] - position[0]
         if self.axis is not None:
             chord = chord - (chord @ self.axis) * self.axis
@@ -283,13 +283,13 @@ class Radius(Windowed, kind="radius"):
         self.space = observe.space
         if not observe.reduces:
             raise Unfit("space", self.space, '"mean", "max" or "min"')
-        self.place = Place(self.s, self.at)
+        self.location = Location(self.s, self.at)
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        points = self.place.values(self.look(frame).position)
-        across = _distance_across(points - self.place.reduced(points, "mean"), self.axis)
-        return float(self.place.reduced(across, self.space))
+        points = self.location.values(self.look(snapshot).position)
+        across = _distance_across(points - self.location.reduced(points, "mean"), self.axis)
+        return float(self.location.reduced(across, self.space))
 
 
 class OnFluid(Windowed):
@@ -314,9 +314,9 @@ class Force(OnFluid, kind="force"):
     dimension = "force"
     description = "force"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        filament = self.look(frame)
+        filament = self.look(snapshot)
         if self.end:
             return self.component(getattr(filament, f"reaction_{self.end}"))
         return self.component(filament.force[self.inside].sum(axis=0))
@@ -331,9 +331,9 @@ class Torque(OnFluid, kind="torque"):
     dimension = "force length"
     description = "torque"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        filament = self.look(frame)
+        filament = self.look(snapshot)
         if self.end:
             sign, node = SUPPORTS[self.end]
             return self.component(sign * _lab_moment(filament, self.s, node))
@@ -350,13 +350,13 @@ class Power(Windowed, kind="power"):
     dimension = "force length/time"
     description = "power on the fluid"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        filament = self.look(frame)
+        filament = self.look(snapshot)
         return float(np.sum(filament.power[self.inside]))
 
 
-class Dissipation(Kind, kind="dissipation"):
+class Dissipation(ObservableBase, kind="dissipation"):
     """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
 
     On a grid it costs an evaluation of the fluid at each output.
@@ -366,9 +366,9 @@ class Dissipation(Kind, kind="dissipation"):
     dimension = "force length/time"
     description = "power turned into heat by the fluid, filaments together, one"
 
-    def sample(self, frame: Frame) -> Value:
+    def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
-        return float(frame.diagnostics["dissipation"])
+        return float(snapshot.diagnostics["dissipation"])
 
 
 def _distance_across(points: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
@@ -377,7 +377,7 @@ def _distance_across(points: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
     return np.linalg.norm(np.cross(points, axis), axis=1)
 
 
-def _lab_moment(filament: FilamentFrame, s: np.ndarray, node: int) -> np.ndarray:
+def _lab_moment(filament: FilamentSnapshot, s: np.ndarray, node: int) -> np.ndarray:
     """Moment (3,) at an end node in the lab frame; its tangent by one-sided differences of second order."""
     three = slice(0, 3) if node == 0 else slice(-3, None)
     e1 = filament.e1[node]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..io.frames import Frame
+from ..io.snapshots import Snapshot
 from .base import Observable, Value, _shown
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ class Summary:
     note: str = ""
 
 
-class Observers:
+class ObservableSet:
     """The observables of a run, and what they have seen."""
 
     def __init__(self, observables: Mapping[str, Observable]) -> None:
@@ -31,10 +31,10 @@ class Observers:
         self._times: list[float] = []
         self._series: dict[str, list[Value]] = {name: [] for name in observables}
 
-    def take(self, frame: Frame) -> dict[str, Value]:
+    def record(self, snapshot: Snapshot) -> dict[str, Value]:
         """Look at one output; the values by name."""
-        values = {name: observable.sample(frame) for name, observable in self.observables.items()}
-        self._times.append(frame.time)
+        values = {name: observable.sample(snapshot) for name, observable in self.observables.items()}
+        self._times.append(snapshot.time)
         for name, value in values.items():
             self._series[name].append(value)
         return values

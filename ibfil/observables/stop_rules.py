@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .base import Observable
-from .observers import Observers
+from .observers import ObservableSet
 
 if TYPE_CHECKING:
     from ..case.schema import Case, Stop
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class StopRules:
     """The stop rules of a case, looked at once for each output in the order of time (as `Observers.take`)."""
 
-    def __init__(self, case: Case, observers: Observers) -> None:
+    def __init__(self, case: Case, observers: ObservableSet) -> None:
         self._rules, self._observers = case.stops, observers
         self._since: dict[int, float] = {}  # rule -> since when it holds
 

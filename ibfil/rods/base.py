@@ -7,19 +7,19 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import StepFailed
-from .geometry import Geometry
-from .linearization import Variation
+from .geometry import Configuration
+from .linearization import Linearization
 
 
 class Law(Protocol):
     """A constitutive law of all n nodes: strains in, moments out, with their derivatives.
 
-    The caller puts zeros into what is returned at ends that carry no moment. ``beside`` (n, 2) are dM3/dO3 at a half
-    node by the twist of the half nodes before and after it, or None where M3 is a matter of its own half node.
+    The caller puts zeros into what is returned at ends that carry no moment. ``nonlocal_twist`` (n, 2) are dM3/dO3 at a
+    half node by the twist of the half nodes before and after it, or None where M3 is a matter of its own half node.
     """
 
     @property
-    def beside(self) -> np.ndarray | None:
+    def nonlocal_twist(self) -> np.ndarray | None:
         """Constant in time, zero where there is no such half node."""
 
     def bending(self, bend: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -34,13 +34,13 @@ class Load(Protocol):
 
     drives: bool
 
-    def end_moment(self, shape: Geometry, time: float) -> tuple[int, np.ndarray] | None:
+    def end_moment(self, configuration: Configuration, time: float) -> tuple[int, np.ndarray] | None:
         """The node of a free end that it gives a moment, and that moment (3,), in the lab; None where it does not."""
 
-    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+    def add_force(self, configuration: Configuration, time: float, force: np.ndarray) -> None:
         """Adds the force on each node, (n, m)."""
 
-    def add_stiffness(self, time: float, variation: Variation) -> None:
+    def add_stiffness(self, time: float, linearization: Linearization) -> None:
         """Adds its derivative to the band matrix being filled."""
 
 

@@ -15,7 +15,7 @@ import numpy as np
 Turn = Callable[[float, float], float]  # the angle turned between two times
 
 
-class HeldEnd(NamedTuple):
+class PrescribedEnd(NamedTuple):
     """One held end: its node in the stack, its turn if e1 is held there, its place over time if it moves."""
 
     node: int
@@ -44,10 +44,10 @@ def turned(angle: Callable[[float], float]) -> Turn:
     return lambda before, after: angle(after) - angle(before)
 
 
-class HeldEnds:
+class PrescribedEnds:
     """All held unknowns of a scene: flat indices node * m + component, and their displacements over a step."""
 
-    def __init__(self, ends: Sequence[HeldEnd], unknowns: int, idle: np.ndarray) -> None:
+    def __init__(self, ends: Sequence[PrescribedEnd], unknowns: int, idle: np.ndarray) -> None:
         """``idle``: nodes of filaments that do not twist in a scene where others do; their turn is held at zero."""
         index: list[int] = []
         self._turns: list[tuple[int, Turn]] = []

@@ -34,7 +34,7 @@ A law of your own is an object with the two methods of `MomentLaw`, given by the
 ... every = 20.0
 ... ''', "rod.toml")
 >>> result = ibfil.run(case, laws={"rod": Locking(1.0, 2.0)}, progress=False, log=lambda line: None)
->>> strain = result.frame.filaments["rod"].strain[:-1, 0]     # of 2 = O/(1 - O^2/4): O = sqrt(5) - 1
+>>> strain = result.snapshot.filaments["rod"].strain[:-1, 0]     # of 2 = O/(1 - O^2/4): O = sqrt(5) - 1
 >>> bool(np.allclose(strain, np.sqrt(5) - 1, atol=1e-5))
 True
 """
@@ -72,7 +72,7 @@ class MomentLaw(Protocol):
         """
 
 
-def gather(parts: Sequence[tuple[slice, Callable, np.ndarray]], shape: tuple[int, ...]) -> Field:
+def gather(parts: Sequence[tuple[slice, Callable, np.ndarray]], configuration: tuple[int, ...]) -> Field:
     """A field over all nodes from one function of (s, t) a filament: (nodes, function, arclength) each.
 
     A function that is the same for several filaments in a row should come as one part.
@@ -80,7 +80,7 @@ def gather(parts: Sequence[tuple[slice, Callable, np.ndarray]], shape: tuple[int
     if len(parts) == 1:
         _, only, s = parts[0]
         return lambda t: only(s, t)
-    out = np.empty(shape)
+    out = np.empty(configuration)
 
     def evaluate(t: float) -> np.ndarray:
         for nodes, function, s in parts:
@@ -102,7 +102,7 @@ class Linear:
     k1 and k2 (n,) each, ``rate`` gives tau0 (n,) at nodes, averaged to half nodes; both of time.
     """
 
-    beside = None
+    nonlocal_twist = None
 
     def __init__(self, bending: np.ndarray, torsion: np.ndarray, curvature: tuple[Field, Field], rate: Field) -> None:
         self._bending, self._torsion, self._curvature, self._rate = bending.copy(), torsion, curvature, rate
@@ -133,7 +133,7 @@ class Stiffening:
     ``torsion`` (n,) its moduli.
     """
 
-    beside = None
+    nonlocal_twist = None
 
     def __init__(
         self, linear: Linear, bending: np.ndarray, torsion: np.ndarray, coefficient: float, exponent: float
@@ -172,7 +172,7 @@ class TwoWell:
     wells and barrier above is this package's choice. The cost of a change along s is `DomainWalls`.
     """
 
-    beside = None
+    nonlocal_twist = None
 
     def __init__(self, linear: Linear, rate: Field, wells: tuple[float, float], barrier: float) -> None:
         self.bending = linear.bending
@@ -189,7 +189,7 @@ class TwoWell:
 class Given:
     """A user's law of one filament, of nodes ``s`` (k,); ``twists``: whether the case gives it a twist modulus."""
 
-    beside = None
+    nonlocal_twist = None
 
     def __init__(self, law: MomentLaw, s: np.ndarray, twists: bool) -> None:
         self._law, self._s, self._half, self._twists = law, s, 0.5 * (s[1:] + s[:-1]), twists
@@ -208,17 +208,17 @@ class Given:
         moment, slope = self._law.twisting(twist[:-1], self._half, time)
         return np.append(self._checked(moment, (k,)), 0.0), np.append(self._checked(slope, (k,)), 0.0)
 
-    def _checked(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        if np.shape(values) != shape:
+    def _checked(self, values: np.ndarray, configuration: tuple[int, ...]) -> np.ndarray:
+        if np.shape(values) != configuration:
             name = type(self._law).__name__
-            raise TypeError(f"law {name}: found an array {np.shape(values)}; wanted {shape}")
+            raise TypeError(f"law {name}: found an array {np.shape(values)}; wanted {configuration}")
         return np.asarray(values, float)
 
 
 class Mixed:
     """Filaments with laws of their own among others: ``base`` for all n nodes, ``others`` for ranges of nodes."""
 
-    beside = None
+    nonlocal_twist = None
 
     def __init__(self, base: Law, others: Sequence[tuple[slice, Law]]) -> None:
         self._base, self._others = base, others
@@ -241,7 +241,7 @@ class Mixed:
 class Driven:
     """Another law with an internal moment (an axoneme's) added to M1 and M2, like -A k in the linear law (Sec. 7.2)."""
 
-    beside = None
+    nonlocal_twist = None
 
     def __init__(self, law: Law, internal: tuple[Field, Field]) -> None:
         self._law, self._internal = law, internal
@@ -262,7 +262,7 @@ class DomainWalls:
     """Another law with the energy g/2 (de3/ds)^2 of a change of the excess twist e3 = O3 - tau0 along s.
 
     M3 gains -d/ds(g de3/ds), by the derivative of the sum of g/2 (e_{i+1/2} - e_{i-1/2})^2/Lc over the inner nodes, so
-    that de3/ds = 0 at the ends. The moment then feels the twist of the half nodes beside: ``beside`` (n, 2) are
+    that de3/ds = 0 at the ends. The moment then feels the twist of the half nodes beside: ``nonlocal_twist`` (n, 2) are
     dM3_h/dO3_{h-1} and dM3_h/dO3_{h+1}. ``gradient`` (n,) is g at nodes, ``rate`` gives tau0.
     """
 
@@ -273,13 +273,13 @@ class DomainWalls:
         before = np.where(inner, gradient / mesh.volume, 0.0)
         after = np.append(before[1:], 0.0)
         self._own = (before + after) / mesh.ds
-        self.beside = -np.stack([before, after], axis=1) / mesh.ds[:, None]
+        self.nonlocal_twist = -np.stack([before, after], axis=1) / mesh.ds[:, None]
 
     def twisting(self, twist: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
         """M3 (n,) at half nodes and its derivative (n,) by the twist of the same half node."""
         moment, slope = self._law.twisting(twist, time)
         strain = twist - to_half(self._rate(time))
         moment = moment + self._own * strain
-        moment[1:] += self.beside[1:, 0] * strain[:-1]
-        moment[:-1] += self.beside[:-1, 1] * strain[1:]
+        moment[1:] += self.nonlocal_twist[1:, 0] * strain[:-1]
+        moment[:-1] += self.nonlocal_twist[:-1, 1] * strain[1:]
         return moment, slope + self._own

@@ -23,8 +23,8 @@ import numpy as np
 from numba import njit
 
 from ..errors import StepFailed, Stopped
-from .geometry import Geometry
-from .linearization import Variation
+from .geometry import Configuration
+from .linearization import Linearization
 from .loads import ExternalLoad
 from .neighbour_search import Pairs, Segments, closest, search
 
@@ -262,18 +262,18 @@ class Repulsion(ExternalLoad):
             self._known = r, contact.near(r, 2.0)
         return repel(contact.segments, r, self._known[1], contact.strength, force)
 
-    def add_force(self, shape: Geometry, time: float, force: np.ndarray) -> None:
+    def add_force(self, configuration: Configuration, time: float, force: np.ndarray) -> None:
         """f = F w (2 - d/D) on the end nodes of either segment."""
-        self._act(shape.r, force)
+        self._act(configuration.r, force)
 
-    def add_stiffness(self, time: float, variation: Variation) -> None:
+    def add_stiffness(self, time: float, linearization: Linearization) -> None:
         """df = -F w/D along the gap, of each segment on itself."""
-        r = variation.shape.r
+        r = linearization.configuration.r
         own, beside = self._act(r, np.zeros((len(r), 3)))
         for blocks, shift in ((own, 0), (beside, 1)):
             nodes = np.nonzero(np.any(blocks, axis=(1, 2)))[0]
-            rows = np.zeros((len(nodes), variation.m, 3))
+            rows = np.zeros((len(nodes), linearization.m, 3))
             rows[:, :3] = blocks[nodes]
-            variation.position(nodes, rows, shift)
+            linearization.position(nodes, rows, shift)
             if shift:
-                variation.position(nodes + 1, rows, -1)
+                linearization.position(nodes + 1, rows, -1)

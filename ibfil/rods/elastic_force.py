@@ -14,7 +14,7 @@ Misprints of the paper that stand corrected here: the sign of the twist term (Eq
 holds for every law and for moduli that vary along s). Both are differences of fluxes, so the forces sum to zero to
 round-off for any moment whatever. M comes from constitutive.py, the strains O, r', r'' and d from geometry.py.
 
-In the names below ``gap`` is d, ``length`` |d|, ``speed`` |r'|, ``d1`` r', ``d2`` r'' and ``stretching`` EA.
+In the names below ``edge`` is d, ``length`` |d|, ``metric`` |r'|, ``r_s`` r', ``r_ss`` r'' and ``stretching`` EA.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 
 from ..linalg.vectors import at, cross, mix, plus, put
-from .geometry import D1, D2, E1, E2, GAP, LENGTH, O1, O2, Geometry
+from .geometry import E1, E2, EDGE, LENGTH, O1, O2, R_S, R_SS, Configuration
 from .mesh import Mesh
 
 
@@ -46,7 +46,7 @@ def release(nodes, bend, bend_slope):
         bend_slope[nodes[k]] = 0.0
 
 
-def nodal_force(mesh: Mesh, g: Geometry, moment: Moment, stretching: np.ndarray, force: np.ndarray) -> None:
+def nodal_force(mesh: Mesh, g: Configuration, moment: Moment, stretching: np.ndarray, force: np.ndarray) -> None:
     """Eq. 44: adds the elastic force on each node, (n, 3), and where ``force`` is (n, 4) the twist torque.
 
     ``stretching`` (n,) is EA at half nodes. The force is the rod's on the fluid.
@@ -65,10 +65,10 @@ def _nodal_force(joined, rest, volume, g, bend, twist, stretching, force):
         tension = stretching[i] * (1.0 - ds / g[i, LENGTH]) - 0.5 * p
         before = mix(bend[i, 0], at(g, i, E2), -bend[i, 1], at(g, i, E1))
         after = mix(bend[j, 0], at(g, j, E2), -bend[j, 1], at(g, j, E1))
-        flux = mix(1.0 / ds, plus(after, -1.0, before), tension / ds, at(g, i, GAP))
+        flux = mix(1.0 / ds, plus(after, -1.0, before), tension / ds, at(g, i, EDGE))
         if m3 != 0.0:
-            flux = plus(flux, 0.5 * m3, cross(at(g, i, D1), at(g, i, D2)))
-            flux = plus(flux, 0.5 * m3, cross(at(g, j, D1), at(g, j, D2)))
+            flux = plus(flux, 0.5 * m3, cross(at(g, i, R_S), at(g, i, R_SS)))
+            flux = plus(flux, 0.5 * m3, cross(at(g, j, R_S), at(g, j, R_SS)))
         put(force, i, 0, plus(at(force, i, 0), 1.0, flux))
         put(force, j, 0, plus(at(force, j, 0), -1.0, flux))
         if m == 4:

@@ -13,7 +13,7 @@ from numba import njit
 
 from ..linalg.vectors import NOT_NEGATIVE, at, cross, dot, mix, plus, scaled
 from .elastic_force import Moment
-from .geometry import D1, D2, E1, E2, E3, GAP, LENGTH, O1, O2, SPEED, Geometry
+from .geometry import E1, E2, E3, EDGE, LENGTH, METRIC, O1, O2, R_S, R_SS, Configuration
 from .mesh import Mesh
 
 
@@ -26,8 +26,8 @@ class _Node(NamedTuple):
     e1: tuple[float, float, float]
     e2: tuple[float, float, float]
     e3: tuple[float, float, float]
-    d1: tuple[float, float, float]
-    d2: tuple[float, float, float]
+    r_s: tuple[float, float, float]
+    r_ss: tuple[float, float, float]
     short: float  # 1/|r'|
     along: float  # l
     turn: tuple[float, float, float]  # dpsi = dphi + turn.dr'
@@ -51,25 +51,25 @@ class _Row(NamedTuple):
 @njit(cache=True, inline="always")
 def _node(g, bend, bend_slope, old, i):
     """How node i changes: dO1 = -e2.x + O2 dpsi, dO2 = e1.x - O1 dpsi; the law's slopes; dP = O.dM + M.dO."""
-    e1, e2, e3, d1, d2 = at(g, i, E1), at(g, i, E2), at(g, i, E3), at(g, i, D1), at(g, i, D2)
+    e1, e2, e3, r_s, r_ss = at(g, i, E1), at(g, i, E2), at(g, i, E3), at(g, i, R_S), at(g, i, R_SS)
     o1, o2, m1, m2 = g[i, O1], g[i, O2], bend[i, 0], bend[i, 1]
     s11, s12, s21, s22 = bend_slope[i, 0, 0], bend_slope[i, 0, 1], bend_slope[i, 1, 0], bend_slope[i, 1, 1]
     x1, x2 = mix(-s11, e2, s12, e1), mix(-s21, e2, s22, e1)
     t1, t2 = s11 * o2 - s12 * o1, s21 * o2 - s22 * o1
     p = plus(plus(mix(o1, x1, o2, x2), -m1, e2), m2, e1)
     p_psi = o1 * t1 + o2 * t2 + m1 * o2 - m2 * o1
-    short, before = 1.0 / g[i, SPEED], at(old, i, E3)
+    short, before = 1.0 / g[i, METRIC], at(old, i, E3)
     turn = scaled(short / (1.0 + dot(before, e3)), cross(e3, before))
-    return _Node(e1, e2, e3, d1, d2, short, short * dot(e3, d2), turn, (m1, m2), x1, x2, p, t1, t2, p_psi)
+    return _Node(e1, e2, e3, r_s, r_ss, short, short * dot(e3, r_ss), turn, (m1, m2), x1, x2, p, t1, t2, p_psi)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _flux(a, f, gap, c):
+def _flux(a, f, edge, c):
     """Component c of f Q - P gap/2 as it follows node ``a``.
 
     dQ = e2 dM1 - e1 dM2 - e3 [M1 (e2.dr') - M2 (e1.dr')]/|r'| - (M1 e1 + M2 e2) dpsi
     """
-    b1, b2, b3, half = f * a.e1[c], f * a.e2[c], f * a.e3[c] * a.short, -0.5 * gap[c]
+    b1, b2, b3, half = f * a.e1[c], f * a.e2[c], f * a.e3[c] * a.short, -0.5 * edge[c]
     second = plus(mix(b2, a.m1, -b1, a.m2), half, a.p)
     psi = b2 * (a.m1_psi - a.moment[1]) - b1 * (a.m2_psi + a.moment[0]) + half * a.p_psi
     slope = plus(mix(-a.along, second, psi, a.turn), -b3 * a.moment[0], a.e2)
@@ -100,7 +100,7 @@ def _twisted(a, m3, x, twist, c):
     """Component c of M3 (X_i + X_{i+1})/2 as it follows node ``a``: dX = r' x dr'' - r'' x dr'; ``x`` the mean X."""
     i, j = (c + 1) % 3, (c + 2) % 3
     u, v, h = _unit(i), _unit(j), 0.5 * m3
-    second, slope = mix(h * a.d1[i], v, -h * a.d1[j], u), mix(h * a.d2[j], u, -h * a.d2[i], v)
+    second, slope = mix(h * a.r_s[i], v, -h * a.r_s[j], u), mix(h * a.r_ss[j], u, -h * a.r_ss[i], v)
     return _Row(second, plus(slope, x[c], twist.slope), x[c] * twist.psi)
 
 
@@ -149,10 +149,10 @@ def _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux):
         here, after = after, _node(g, bend, bend_slope, old, i + 1)
         if joined[i]:
             f = 1.0 / rest[i]
-            gap = scaled(f, at(g, i, GAP))
+            edge = scaled(f, at(g, i, EDGE))
             for c in range(3):
-                _add(_flux(here, -f, gap, c), flux, i, 0, c)
-                _add(_flux(after, f, gap, c), flux, i, 1, c)
+                _add(_flux(here, -f, edge, c), flux, i, 0, c)
+                _add(_flux(after, f, edge, c), flux, i, 1, c)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -162,7 +162,7 @@ def _twist_fluxes(joined, rest, g, bend, bend_slope, twist, twist_slope, old, fl
     for i in range(flux.shape[0] - 1):
         here, after = after, _node(g, bend, bend_slope, old, i + 1)
         if joined[i]:
-            f, x = twist_slope[i] / rest[i], mix(0.5, cross(here.d1, here.d2), 0.5, cross(after.d1, after.d2))
+            f, x = twist_slope[i] / rest[i], mix(0.5, cross(here.r_s, here.r_ss), 0.5, cross(after.r_s, after.r_ss))
             left, right = _twist(here, after, -f), _twist(after, here, f)
             for c in range(3):
                 _add(_twisted(here, twist[i], x, left, c), flux, i, 0, c)
@@ -207,14 +207,14 @@ def _tension(joined, rest, g, bend, stretching, least, matrix):
     for i in range(matrix.shape[0] - 1):
         if not joined[i]:
             continue
-        j, ds, length, gap = i + 1, rest[i], g[i, LENGTH], at(g, i, GAP)
+        j, ds, length, edge = i + 1, rest[i], g[i, LENGTH], at(g, i, EDGE)
         p = bend[i, 0] * g[i, O1] + bend[i, 1] * g[i, O2] + bend[j, 0] * g[j, O1] + bend[j, 1] * g[j, O2]
         tension = stretching[i] * (1.0 - ds / length) - 0.5 * p
         tension = (least if tension < least else tension) / ds
         axial = stretching[i] / length**3
         for a in range(3):
             for c in range(3):
-                b = axial * gap[a] * gap[c] + (tension if a == c else 0.0)
+                b = axial * edge[a] * edge[c] + (tension if a == c else 0.0)
                 matrix[i, a, w, c] -= b
                 matrix[i, a, w + 1, c] += b
                 matrix[j, a, w, c] -= b
@@ -251,8 +251,8 @@ def _stiffness(joined, rest, stencils: Stencils, g, bend, bend_slope, stretching
 def stiffness(
     mesh: Mesh,
     stencils: Stencils,
-    g: Geometry,
-    start: Geometry,
+    g: Configuration,
+    start: Configuration,
     moment: Moment,
     stretching: np.ndarray,
     least: float,

@@ -9,7 +9,7 @@ from ..linalg.vectors import at, cross, dot, mix, plus, put
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def carried(e1, old, new, angle):
+def transported(e1, old, new, angle):
     """Eq. 41: the vector e1 carried from the unit tangent ``old`` to ``new``, then turned about it by ``angle``.
 
     Turning by the angle, rather than adding and renormalising, keeps second order in time. Returns the new e1 and
@@ -26,12 +26,12 @@ def carried(e1, old, new, angle):
 
 
 @njit(cache=True)
-def carry(e1, old, new, angle):
-    """``carried`` for n nodes: e1, old, new (n, 3) and angle (n,) to the new e1 (n, 3) and the smallest 1 + old.new."""
+def transport(e1, old, new, angle):
+    """``transported`` of n nodes: from e1, old, new (n, 3), angle (n,) to new e1 (n, 3) and the least 1 + old.new."""
     n = e1.shape[0]
     out, least = np.empty((n, 3)), 2.0
     for i in range(n):
-        v, one = carried(at(e1, i, 0), at(old, i, 0), at(new, i, 0), angle[i])
+        v, one = transported(at(e1, i, 0), at(old, i, 0), at(new, i, 0), angle[i])
         put(out, i, 0, v)
         least = min(least, one)
     return out, least

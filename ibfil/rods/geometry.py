@@ -9,16 +9,16 @@ import numpy as np
 from numba import njit
 
 from ..linalg.vectors import NOT_NEGATIVE, at, cross, dot, plus, put, scaled
-from .frame import carried
+from .frame import transported
 from .mesh import Mesh
 
 # Columns of a configuration's table: vectors of three, then numbers.
-R, E1, E2, E3, D1, D2, GAP = range(0, 21, 3)
-SPEED, O1, O2, O3, LENGTH = range(21, 26)
+R, E1, E2, E3, R_S, R_SS, EDGE = range(0, 21, 3)
+METRIC, O1, O2, O3, LENGTH = range(21, 26)
 _COLUMNS = 26
 
 
-class Geometry:
+class Configuration:
     """One configuration of n nodes. Half-node values are indexed by segment and zero where there is no segment.
 
     It is one ``table`` (n, 26), a row a node: compiled functions take one array in place of eleven, whose handing over
@@ -31,7 +31,7 @@ class Geometry:
         self.table = table
 
     @classmethod
-    def of(cls, **parts: np.ndarray) -> Geometry:
+    def of(cls, **parts: np.ndarray) -> Configuration:
         """A configuration from all its attributes by name."""
         out = cls(np.empty((len(parts["r"]), _COLUMNS)))
         for name, part in parts.items():
@@ -42,10 +42,10 @@ class Geometry:
     e1 = property(lambda self: self.table[:, E1 : E1 + 3], doc="(n, 3) first director")
     e2 = property(lambda self: self.table[:, E2 : E2 + 3], doc="(n, 3) e3 x e1")
     e3 = property(lambda self: self.table[:, E3 : E3 + 3], doc="(n, 3) unit tangent r'/|r'|")
-    d1 = property(lambda self: self.table[:, D1 : D1 + 3], doc="(n, 3) r'")
-    d2 = property(lambda self: self.table[:, D2 : D2 + 3], doc="(n, 3) r''")
-    gap = property(lambda self: self.table[:, GAP : GAP + 3], doc="(n, 3) d = r_{i+1} - r_i")
-    speed = property(lambda self: self.table[:, SPEED], doc="(n,) |r'|")
+    r_s = property(lambda self: self.table[:, R_S : R_S + 3], doc="(n, 3) r'")
+    r_ss = property(lambda self: self.table[:, R_SS : R_SS + 3], doc="(n, 3) r''")
+    edge = property(lambda self: self.table[:, EDGE : EDGE + 3], doc="(n, 3) d = r_{i+1} - r_i")
+    metric = property(lambda self: self.table[:, METRIC], doc="(n,) |r'|")
     bend = property(lambda self: self.table[:, O1 : O2 + 1], doc="(n, 2) O1 = -e2.r'', O2 = e1.r''")
     twist = property(lambda self: self.table[:, O3], doc="(n,) O3 at half nodes, Eq. 39")
     length = property(lambda self: self.table[:, LENGTH], doc="(n,) |d|; 1 where there is no segment")
@@ -54,13 +54,13 @@ class Geometry:
 @njit(cache=True, inline="always")
 def _derivatives(mesh, g, i):
     """r' and r'' at node i, from the positions in the table, through the stencils."""
-    d1, d2 = at(mesh.c1, i, 0), at(mesh.c2, i, 0)
+    r_s, r_ss = at(mesh.c1, i, 0), at(mesh.c2, i, 0)
     first = mesh.first[i] & NOT_NEGATIVE
     for k in range(mesh.w1.shape[1]):
         r = at(g, first + k, R)
-        d1 = plus(d1, mesh.w1[i, k], r)
-        d2 = plus(d2, mesh.w2[i, k], r)
-    return d1, d2
+        r_s = plus(r_s, mesh.w1[i, k], r)
+        r_ss = plus(r_ss, mesh.w2[i, k], r)
+    return r_s, r_ss
 
 
 @njit(cache=True, error_model="numpy")
@@ -69,23 +69,23 @@ def tangents(mesh: Mesh, r):
     n = r.shape[0]
     e3 = np.empty((n, 3))
     for i in range(n):
-        d1, _ = _derivatives(mesh, r, i)
-        put(e3, i, 0, scaled(1.0 / np.sqrt(dot(d1, d1)), d1))
+        r_s, _ = _derivatives(mesh, r, i)
+        put(e3, i, 0, scaled(1.0 / np.sqrt(dot(r_s, r_s)), r_s))
     return e3
 
 
 @njit(cache=True, inline="always")
-def _measure_node(g, i, d1, d2, e1):
+def _measure_node(g, i, r_s, r_ss, e1):
     """Writes the frame, r', r'' and the curvatures of a node: O1 = -e2.r'', O2 = e1.r''."""
-    speed = np.sqrt(dot(d1, d1))
-    e3 = d1[0] / speed, d1[1] / speed, d1[2] / speed
+    metric = np.sqrt(dot(r_s, r_s))
+    e3 = r_s[0] / metric, r_s[1] / metric, r_s[2] / metric
     e2 = cross(e3, e1)
     put(g, i, E1, e1)
     put(g, i, E2, e2)
     put(g, i, E3, e3)
-    put(g, i, D1, d1)
-    put(g, i, D2, d2)
-    g[i, SPEED], g[i, O1], g[i, O2] = speed, -dot(e2, d2), dot(e1, d2)
+    put(g, i, R_S, r_s)
+    put(g, i, R_SS, r_ss)
+    g[i, METRIC], g[i, O1], g[i, O2] = metric, -dot(e2, r_ss), dot(e1, r_ss)
 
 
 @njit(cache=True, inline="always")
@@ -93,13 +93,13 @@ def _measure_segments(mesh, g):
     """Writes d, |d| and O3 = (e2_i + e2_{i+1}).(e1_{i+1} - e1_i)/(2 ds) (Eq. 39) of every segment."""
     for i in range(g.shape[0]):
         if mesh.joined[i]:
-            gap = plus(at(g, i + 1, R), -1.0, at(g, i, R))
+            edge = plus(at(g, i + 1, R), -1.0, at(g, i, R))
             turn = plus(at(g, i + 1, E1), -1.0, at(g, i, E1))
-            put(g, i, GAP, gap)
-            g[i, LENGTH] = np.sqrt(dot(gap, gap))
+            put(g, i, EDGE, edge)
+            g[i, LENGTH] = np.sqrt(dot(edge, edge))
             g[i, O3] = dot(plus(at(g, i, E2), 1.0, at(g, i + 1, E2)), turn) / (2.0 * mesh.ds[i])
         else:
-            put(g, i, GAP, (0.0, 0.0, 0.0))
+            put(g, i, EDGE, (0.0, 0.0, 0.0))
             g[i, LENGTH], g[i, O3] = 1.0, 0.0
 
 
@@ -110,8 +110,8 @@ def _measured(mesh: Mesh, r, e1):
     for i in range(n):
         put(g, i, R, at(r, i, 0))
     for i in range(n):
-        d1, d2 = _derivatives(mesh, g, i)
-        _measure_node(g, i, d1, d2, at(e1, i, 0))
+        r_s, r_ss = _derivatives(mesh, g, i)
+        _measure_node(g, i, r_s, r_ss, at(e1, i, 0))
     _measure_segments(mesh, g)
     return g
 
@@ -124,12 +124,12 @@ def _moved(mesh: Mesh, start, y):
     for i in range(n):
         put(g, i, R, plus(at(start, i, R), 1.0, at(y, i, 0)))
     for i in range(n):
-        d1, d2 = _derivatives(mesh, g, i)
-        e3 = scaled(1.0 / np.sqrt(dot(d1, d1)), d1)
-        e1, one = carried(at(start, i, E1), at(start, i, E3), e3, y[i, 3] if m == 4 else 0.0)
+        r_s, r_ss = _derivatives(mesh, g, i)
+        e3 = scaled(1.0 / np.sqrt(dot(r_s, r_s)), r_s)
+        e1, one = transported(at(start, i, E1), at(start, i, E3), e3, y[i, 3] if m == 4 else 0.0)
         if one < least or one != one:
             least, where = one, i
-        _measure_node(g, i, d1, d2, e1)
+        _measure_node(g, i, r_s, r_ss, e1)
     _measure_segments(mesh, g)
     return g, least, where
 
@@ -155,9 +155,9 @@ def _turned(joined, start, held, y):
     first = 0
     for i in range(y.shape[0]):
         if joined[i]:
-            gap = at(start, i, GAP)
-            new = plus(gap, 1.0, plus(at(y, i + 1, 0), -1.0, at(y, i, 0)))
-            change = plus(scaled(start[i, LENGTH] / np.sqrt(dot(new, new)), new), -1.0, gap)
+            edge = at(start, i, EDGE)
+            new = plus(edge, 1.0, plus(at(y, i + 1, 0), -1.0, at(y, i, 0)))
+            change = plus(scaled(start[i, LENGTH] / np.sqrt(dot(new, new)), new), -1.0, edge)
             put(out, i + 1, 0, plus(at(out, i, 0), 1.0, change))
         else:
             _replace(first, i, held, y, out)
@@ -165,7 +165,7 @@ def _turned(joined, start, held, y):
     return out
 
 
-def turned(mesh: Mesh, start: Geometry, held: np.ndarray, y: np.ndarray) -> np.ndarray:
+def turned(mesh: Mesh, start: Configuration, held: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Displacements (n, m) that turn every segment as y (n, m) does and leave it as long as it is in ``start``.
 
     The nodes' mean, or those ends that are ``held`` (n,), are where y has them; between two of these the rest is shared
@@ -174,15 +174,15 @@ def turned(mesh: Mesh, start: Geometry, held: np.ndarray, y: np.ndarray) -> np.n
     return _turned(mesh.joined, start.table, held, y)
 
 
-def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Geometry:
+def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Configuration:
     """Strains and spacing of the configuration r, e1 (n, 3); e1 is taken as normal to the stencils' tangents."""
-    return Geometry(_measured(mesh, r, e1))
+    return Configuration(_measured(mesh, r, e1))
 
 
-def moved(mesh: Mesh, start: Geometry, y: np.ndarray) -> tuple[Geometry, float, int]:
+def moved(mesh: Mesh, start: Configuration, y: np.ndarray) -> tuple[Configuration, float, int]:
     """The configuration displaced by y (n, m) from ``start``, e1 carried along (Eq. 41) and, where m = 4, turned.
 
     Also the smallest 1 + e3.e3' met, and its node: near zero a tangent has all but reversed.
     """
     table, least, where = _moved(mesh, start.table, y)
-    return Geometry(table), least, where
+    return Configuration(table), least, where

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import Geometry
+from .geometry import Configuration
 from .mesh import Mesh
 
 Shift = int | np.ndarray
@@ -29,16 +29,16 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
-class Variation:
-    """A band matrix (n, m, (2 w + 1) m) being filled, at the configuration ``shape`` reached from ``start``.
+class Linearization:
+    """A band matrix (n, m, (2 w + 1) m) being filled, at the configuration ``configuration`` reached from ``start``.
 
     In each method ``nodes`` (k,) are the nodes whose quantity varies, ``rows`` (k, m, 3) or (k, m) its factor, and the
     result goes to the rows of the nodes ``nodes + shift``; no node comes twice with the same shift. Rows of forces come
     first, the torque (m = 4) last.
     """
 
-    def __init__(self, mesh: Mesh, shape: Geometry, start: Geometry, matrix: np.ndarray) -> None:
-        self.mesh, self.shape, self.start, self.matrix = mesh, shape, start, matrix
+    def __init__(self, mesh: Mesh, configuration: Configuration, start: Configuration, matrix: np.ndarray) -> None:
+        self.mesh, self.configuration, self.start, self.matrix = mesh, configuration, start, matrix
         self.m = matrix.shape[1]
         self._w = (matrix.shape[2] // self.m - 1) // 2
 
@@ -67,12 +67,12 @@ class Variation:
 
     def across(self, nodes: np.ndarray) -> np.ndarray:
         """(1 - e3 e3)/|r'| (k, 3, 3)."""
-        e3 = self.shape.e3[nodes]
-        return (np.eye(3) - e3[:, :, None] * e3[:, None, :]) / self.shape.speed[nodes][:, None, None]
+        e3 = self.configuration.e3[nodes]
+        return (np.eye(3) - e3[:, :, None] * e3[:, None, :]) / self.configuration.metric[nodes][:, None, None]
 
     def _swing(self, nodes: np.ndarray) -> np.ndarray:
         """What dpsi has of de3 (k, 3)."""
-        e3, old = self.shape.e3[nodes], self.start.e3[nodes]
+        e3, old = self.configuration.e3[nodes], self.start.e3[nodes]
         return cross(e3, old) / (1.0 + _dot(e3, old))
 
     def _spin(self, nodes: np.ndarray, rows: np.ndarray, shift: Shift) -> None:
@@ -89,7 +89,7 @@ class Variation:
         """
         a, b = half, half + 1
         e1a, e2a, e3a, e1b, e2b, e3b = (
-            e[nodes] for nodes in (a, b) for e in (self.shape.e1, self.shape.e2, self.shape.e3)
+            e[nodes] for nodes in (a, b) for e in (self.configuration.e1, self.configuration.e2, self.configuration.e3)
         )
         on_a = _dot(e2b, e3a) * e1a - _dot(e3a, e1b) * e2a
         on_b = _dot(e3b, e1a) * e2b - _dot(e2a, e3b) * e1b
@@ -100,20 +100,20 @@ class Variation:
         self._spin(a, -rows * along, shift)
         self._spin(b, rows * along, shift - 1)
 
-    def beside(self, levers: np.ndarray, factors: np.ndarray) -> None:
+    def nonlocal_twist(self, unit_responses: np.ndarray, factors: np.ndarray) -> None:
         """The part of M3 that comes from the twist of the half nodes before and after, by ``factors`` (n, 2).
 
-        ``levers`` (n, 2, m) are the forces of a unit M3 at each half node on the nodes before and after it.
+        ``unit_responses`` (n, 2, m) are the forces of a unit M3 at each half node on the nodes before and after it.
         """
         for k, step in ((0, -1), (1, 1)):
             half = np.nonzero(factors[:, k])[0]
             for side in (0, 1):
-                rows = levers[half, side] * factors[half, k][:, None]
+                rows = unit_responses[half, side] * factors[half, k][:, None]
                 self.twist(half + step, rows, side - step)
 
     def directors(self, nodes: np.ndarray, parts: np.ndarray, rows: np.ndarray, shift: Shift = 0) -> None:
         """rows (k, m, 3) times the change of the vectors p1 e1 + p2 e2 + p3 e3, ``parts`` (k, 3)."""
-        e1, e2, e3 = (e[nodes] for e in (self.shape.e1, self.shape.e2, self.shape.e3))
+        e1, e2, e3 = (e[nodes] for e in (self.configuration.e1, self.configuration.e2, self.configuration.e3))
         p1, p2, p3 = (parts[:, c : c + 1] for c in range(3))
         bent = p1 * e1 + p2 * e2
         change = p3[:, :, None] * np.eye(3) - e3[:, :, None] * bent[:, None, :]

@@ -9,17 +9,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..linalg.constraints import Held
+from ..linalg.constraints import Prescribed
 from . import elastic_force, elastic_jacobian
 from . import mesh as rods_mesh
 from .base import REVERSED, Ends, Law, Load, TangentReversed
 from .elastic_force import Moment
-from .geometry import Geometry, measure, moved, tangents, turned
-from .linearization import Variation
+from .geometry import Configuration, measure, moved, tangents, turned
+from .linearization import Linearization
 from .mesh import Mesh
 
 
-class Mechanics:
+class RodSystem:
     """n nodes with m unknowns each: 3, or 4 where a filament twists.
 
     ``free`` (n,) is True at ends that carry no moment; there M, and so Q, M3, P and the twist source, are zero.
@@ -41,91 +41,97 @@ class Mechanics:
         self.mesh, self.law, self.stretching, self.length = mesh, law, stretching, length
         self.ends, self.loads, self.unknowns = ends, loads, unknowns
         self._free = np.nonzero(free)[0]
-        self.profile = rods_mesh.profile(mesh, 1 if law.beside is None else 2)
+        self.profile = rods_mesh.profile(mesh, 1 if law.nonlocal_twist is None else 2)
         self._matrix_shape = (len(free), unknowns, (2 * self.profile.width + 1) * unknowns)
         self._stencils = elastic_jacobian.stencils(mesh)
         self._zero = np.zeros(len(free))
         self._held = np.zeros(len(free), bool)
         self._held[ends.index[ends.index % unknowns < 3] // unknowns] = True
 
-    def start(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
+    def start(self, r: np.ndarray, e1: np.ndarray) -> Configuration:
         """The configuration r (n, 3) with e1 (n, 3) made normal to the stencils' tangents."""
         e3 = tangents(self.mesh, r)
         normal = e1 - np.sum(e1 * e3, axis=1)[:, None] * e3
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         return measure(self.mesh, np.ascontiguousarray(r), normal)
 
-    def move(self, start: Geometry, y: np.ndarray) -> Geometry:
+    def move(self, start: Configuration, y: np.ndarray) -> Configuration:
         """The configuration displaced by y (n, m) from ``start``, e1 carried along and turned."""
-        shape, least, where = moved(self.mesh, start, y)
+        configuration, least, where = moved(self.mesh, start, y)
         if not least > REVERSED:
             raise TangentReversed(where, least)
-        return shape
+        return configuration
 
-    def turned(self, start: Geometry, y: np.ndarray) -> np.ndarray:
+    def turned(self, start: Configuration, y: np.ndarray) -> np.ndarray:
         """Displacements (n, m) that turn every segment as y does and do not stretch it."""
         return turned(self.mesh, start, self._held, y)
 
-    def moment(self, shape: Geometry, time: float) -> Moment:
+    def moment(self, configuration: Configuration, time: float) -> Moment:
         """The law's moments, zero at free ends."""
-        bend, bend_slope = self.law.bending(shape.bend, time)
+        bend, bend_slope = self.law.bending(configuration.bend, time)
         elastic_force.release(self._free, bend, bend_slope)
         if self.unknowns == 3:
             return Moment(bend, bend_slope, self._zero, self._zero)
-        return Moment(bend, bend_slope, *self.law.twisting(shape.twist, time))
+        return Moment(bend, bend_slope, *self.law.twisting(configuration.twist, time))
 
-    def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Moment]:
+    def forces(self, configuration: Configuration, time: float) -> tuple[np.ndarray, Moment]:
         """Eq. 44 and the loads on each node, (n, m), and the moments they come from."""
-        moment = self.moment(shape, time)
-        force = self.elastic(shape, moment, self.stretching)
+        moment = self.moment(configuration, time)
+        force = self.elastic(configuration, moment, self.stretching)
         for load in self.loads:
-            load.add_force(shape, time, force)
+            load.add_force(configuration, time, force)
         return force, moment
 
-    def elastic(self, shape: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:
+    def elastic(self, configuration: Configuration, moment: Moment, stretching: np.ndarray) -> np.ndarray:
         """Eq. 44 (n, m) for given moments and axial stiffness (n,)."""
-        force = np.zeros((len(shape.table), self.unknowns))
-        elastic_force.nodal_force(self.mesh, shape, moment, stretching, force)
+        force = np.zeros((len(configuration.table), self.unknowns))
+        elastic_force.nodal_force(self.mesh, configuration, moment, stretching, force)
         return force
 
-    def _levers(self, shape: Geometry) -> np.ndarray:
+    def _unit_responses(self, configuration: Configuration) -> np.ndarray:
         """The forces (n, 2, m) that a unit M3 at each half node gives the nodes before and after it.
 
         The force is linear in M3, and each M3 acts on the two nodes beside its half node only: so a unit M3 on every
         other half node, and then on the rest, gives them all.
         """
-        n = len(shape.r)
+        n = len(configuration.r)
         none = Moment(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n))
         out = np.zeros((n, 2, self.unknowns))
         for first in (0, 1):
             unit = np.where((np.arange(n) % 2 == first) & self.mesh.joined, 1.0, 0.0)
-            force = self.elastic(shape, none._replace(twist=unit), self._zero)
+            force = self.elastic(configuration, none._replace(twist=unit), self._zero)
             half = np.nonzero(unit)[0]
             out[half] = np.stack([force[half], force[half + 1]], axis=1)
         return out
 
-    def stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float) -> np.ndarray:
+    def stiffness(self, configuration: Configuration, start: Configuration, moment: Moment, time: float) -> np.ndarray:
         """The exact Jacobian of ``forces`` with respect to the displacements from ``start``, by bands."""
-        return self._stiffness(shape, start, moment, time, -np.inf)
+        return self._stiffness(configuration, start, moment, time, -np.inf)
 
-    def definite_stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float) -> np.ndarray:
+    def definite_stiffness(
+        self, configuration: Configuration, start: Configuration, moment: Moment, time: float
+    ) -> np.ndarray:
         """The same but for compression, which is left out of the geometric stiffness: one linear solve is robust."""
-        return self._stiffness(shape, start, moment, time, 0.0)
+        return self._stiffness(configuration, start, moment, time, 0.0)
 
-    def _stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, least: float) -> np.ndarray:
+    def _stiffness(
+        self, configuration: Configuration, start: Configuration, moment: Moment, time: float, least: float
+    ) -> np.ndarray:
         """The Jacobian with tensions not below ``least`` (elasticity.stiffness)."""
         matrix = np.zeros(self._matrix_shape)
-        elastic_jacobian.stiffness(self.mesh, self._stencils, shape, start, moment, self.stretching, least, matrix)
-        self._add_stiffness(Variation(self.mesh, shape, start, matrix), time)
+        elastic_jacobian.stiffness(
+            self.mesh, self._stencils, configuration, start, moment, self.stretching, least, matrix
+        )
+        self._add_stiffness(Linearization(self.mesh, configuration, start, matrix), time)
         return matrix
 
-    def _add_stiffness(self, variation: Variation, time: float) -> None:
+    def _add_stiffness(self, linearization: Linearization, time: float) -> None:
         """What the kernels leave out: the part of M3 that comes from half nodes beside, and the loads."""
-        if self.law.beside is not None:
-            variation.beside(self._levers(variation.shape), self.law.beside)
+        if self.law.nonlocal_twist is not None:
+            linearization.nonlocal_twist(self._unit_responses(linearization.configuration), self.law.nonlocal_twist)
         for load in self.loads:
-            load.add_stiffness(time, variation)
+            load.add_stiffness(time, linearization)
 
-    def held(self, before: float, after: float) -> Held:
+    def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""
-        return Held(self.ends.index, self.ends.motion(before, after))
+        return Prescribed(self.ends.index, self.ends.motion(before, after))

@@ -17,11 +17,11 @@ import numpy as np
 
 from .base import TangentReversed
 from .elastic_force import Moment
-from .frame import carry
-from .geometry import Geometry
-from .linearization import Shift, Variation
+from .frame import transport
+from .geometry import Configuration
+from .linearization import Linearization, Shift
 from .mesh import Mesh
-from .system import Mechanics
+from .system import RodSystem
 
 
 def _before(values: np.ndarray) -> np.ndarray:
@@ -50,10 +50,10 @@ class _Bisectors:
     def __init__(self, mesh: Mesh, r: np.ndarray) -> None:
         n = len(r)
         joined = mesh.joined
-        self.gap = np.zeros((n, 3))
-        self.gap[:-1] = np.where(joined[:-1, None], np.diff(r, axis=0), 0.0)
-        self.length = np.where(joined, np.sqrt(_dot(self.gap, self.gap)), 1.0)
-        self.u = self.gap / self.length[:, None]
+        self.edge = np.zeros((n, 3))
+        self.edge[:-1] = np.where(joined[:-1, None], np.diff(r, axis=0), 0.0)
+        self.length = np.where(joined, np.sqrt(_dot(self.edge, self.edge)), 1.0)
+        self.u = self.edge / self.length[:, None]
         left, right = _before(self.u), self.u
         self.has_left, self.has_right = np.append(False, joined[:-1]), joined
         inner = self.has_left & self.has_right
@@ -77,26 +77,26 @@ class _Bisectors:
         self.e3[clamped] = mesh.c1[clamped]
 
 
-def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Geometry:
-    """Strains about the bisectors; ``d1`` holds s, ``speed`` its size. ``e1`` (n, 3) is taken as normal to them."""
+def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Configuration:
+    """Strains about the bisectors; ``r_s`` holds s, ``metric`` its size. ``e1`` (n, 3) is taken as normal to them."""
     b = _Bisectors(mesh, r)
     columns = mesh.first[:, None] + np.arange(mesh.w2.shape[1])
-    d2 = np.einsum("ik,ikc->ic", mesh.w2, r[columns]) + mesh.c2
+    r_ss = np.einsum("ik,ikc->ic", mesh.w2, r[columns]) + mesh.c2
     e2 = np.cross(b.e3, e1)
-    bend = np.stack([-_dot(e2, d2), _dot(e1, d2)], axis=1)
+    bend = np.stack([-_dot(e2, r_ss), _dot(e1, r_ss)], axis=1)
     twist = np.zeros(len(r))
     twist[:-1] = _dot(e2[:-1] + e2[1:], e1[1:] - e1[:-1]) / (2 * mesh.ds[:-1])
-    return Geometry.of(
+    return Configuration.of(
         r=r,
         e1=e1,
         e2=e2,
         e3=b.e3,
-        speed=b.size,
-        d1=b.s,
-        d2=d2,
+        metric=b.size,
+        r_s=b.s,
+        r_ss=r_ss,
         bend=bend,
         twist=np.where(mesh.joined, twist, 0.0),
-        gap=b.gap,
+        edge=b.edge,
         length=b.length,
     )
 
@@ -106,42 +106,42 @@ def _next(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[1:], np.zeros_like(values[:1])])
 
 
-class TorqueFree(Mechanics):
+class TorqueFree(RodSystem):
     """Mechanics with the torque-free force."""
 
-    def start(self, r: np.ndarray, e1: np.ndarray) -> Geometry:
+    def start(self, r: np.ndarray, e1: np.ndarray) -> Configuration:
         """The configuration r (n, 3) with e1 (n, 3) made normal to the bisectors."""
         e3 = _Bisectors(self.mesh, r).e3
         normal = e1 - _dot(e1, e3)[:, None] * e3
         return measure(self.mesh, r, normal / np.sqrt(_dot(normal, normal))[:, None])
 
-    def move(self, start: Geometry, y: np.ndarray) -> Geometry:
+    def move(self, start: Configuration, y: np.ndarray) -> Configuration:
         """The configuration displaced by y (n, m) from ``start``, e1 carried along and turned."""
         r = start.r + y[:, :3]
         b = _Bisectors(self.mesh, r)
         turn = np.ascontiguousarray(y[:, 3]) if self.unknowns == 4 else np.zeros(len(r))
-        e1, least = carry(start.e1, start.e3, b.e3, turn)
+        e1, least = transport(start.e1, start.e3, b.e3, turn)
         if not min(least, b.least) > 0.02:
             along = 1.0 + _dot(start.e3, b.e3)
             raise TangentReversed(int(np.argmin(along)), float(np.min(along)))
         return measure(self.mesh, r, e1)
 
-    def _tension(self, g: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:
+    def _tension(self, g: Configuration, moment: Moment, stretching: np.ndarray) -> np.ndarray:
         p = _dot(moment.bend, g.bend)
         return stretching * (1 - self.mesh.ds / g.length) - 0.5 * (p + _next(p))
 
-    def elastic(self, shape: Geometry, moment: Moment, stretching: np.ndarray) -> np.ndarray:
+    def elastic(self, configuration: Configuration, moment: Moment, stretching: np.ndarray) -> np.ndarray:
         """Nodal forces (n, 3), or with the twist torque (n, 4), for given moments and axial stiffness (n,)."""
         mesh = self.mesh
-        force = np.zeros((len(shape.r), self.unknowns))
-        flux = self._bending_flux(shape, moment)
-        flux += (self._tension(shape, moment, stretching) / mesh.ds)[:, None] * shape.gap
+        force = np.zeros((len(configuration.r), self.unknowns))
+        flux = self._bending_flux(configuration, moment)
+        flux += (self._tension(configuration, moment, stretching) / mesh.ds)[:, None] * configuration.edge
         flux[~mesh.joined] = 0.0
         force[:, :3] = flux - _before(flux)
         if self.unknowns == 4:
-            u = shape.gap / shape.length[:, None]
-            force[:, 3] = shape.speed * (moment.twist - _before(moment.twist)) - _dot(
-                self._kink(u), self._vector(shape, moment)
+            u = configuration.edge / configuration.length[:, None]
+            force[:, 3] = configuration.metric * (moment.twist - _before(moment.twist)) - _dot(
+                self._kink(u), self._vector(configuration, moment)
             )
         return force
 
@@ -149,29 +149,31 @@ class TorqueFree(Mechanics):
         """u_{i+1/2} - u_{i-1/2}, with the tangent of a clamp in place of the segment that is not there."""
         return u - _before(u) + np.where(self.mesh.joined, -1.0, 1.0)[:, None] * self.mesh.c1
 
-    def _vector(self, g: Geometry, moment: Moment) -> np.ndarray:
+    def _vector(self, g: Configuration, moment: Moment) -> np.ndarray:
         """M1 e1 + M2 e2 (n, 3)."""
         return moment.bend[:, :1] * g.e1 + moment.bend[:, 1:] * g.e2
 
-    def _bending_flux(self, g: Geometry, moment: Moment) -> np.ndarray:
+    def _bending_flux(self, g: Configuration, moment: Moment) -> np.ndarray:
         """[Q_{i+1} - Q_i + M3 u x (s_{i+1} - s_i)]/|d| (n, 3)."""
         q = moment.bend[:, :1] * g.e2 - moment.bend[:, 1:] * g.e1
-        turn = np.cross(g.gap, _next(g.d1) - g.d1) * (moment.twist / g.length)[:, None]
+        turn = np.cross(g.edge, _next(g.r_s) - g.r_s) * (moment.twist / g.length)[:, None]
         return (_next(q) - q + turn) / g.length[:, None]
 
-    def _stiffness(self, shape: Geometry, start: Geometry, moment: Moment, time: float, least: float) -> np.ndarray:
+    def _stiffness(
+        self, configuration: Configuration, start: Configuration, moment: Moment, time: float, least: float
+    ) -> np.ndarray:
         """The Jacobian of ``forces`` by bands, with tensions not below ``least``."""
-        matrix = _Jacobian(self, shape, start, moment, least).matrix
-        self._add_stiffness(_BisectorVariation(self.mesh, shape, start, matrix), time)
+        matrix = _Jacobian(self, configuration, start, moment, least).matrix
+        self._add_stiffness(_BisectorLinearization(self.mesh, configuration, start, matrix), time)
         return matrix
 
 
-class _BisectorVariation(Variation):
+class _BisectorLinearization(Linearization):
     """Tangents are those of bisectors: they change with the segments beside a node, not with a stencil."""
 
     def tangent(self, nodes: np.ndarray, rows: np.ndarray, shift: Shift = 0) -> None:
         """rows de3, de3 = (1 - e3 e3) ds/|s|."""
-        b = _Bisectors(self.mesh, self.shape.r)
+        b = _Bisectors(self.mesh, self.configuration.r)
         on_s = rows @ self.across(nodes)
         rigid = (np.eye(3) - _outer(b.u, b.u)) / b.length[:, None, None]
         shift = np.broadcast_to(shift, nodes.shape)
@@ -190,20 +192,20 @@ class _Jacobian:
     and with its turn dpsi = dphi + (e3 x old).de3/(1 + old.e3); each flux with the two nodes beside it, and with dd.
     """
 
-    def __init__(self, rods: TorqueFree, g: Geometry, start: Geometry, moment: Moment, least: float) -> None:
+    def __init__(self, rods: TorqueFree, g: Configuration, start: Configuration, moment: Moment, least: float) -> None:
         self.mesh, self.g, self.m3 = rods.mesh, g, moment.twist
         self.m, self.w = rods.unknowns, rods.profile.width
         self.b = _Bisectors(rods.mesh, g.r)
         n = len(g.r)
         self.matrix = np.zeros((n, self.m, (2 * self.w + 1) * self.m))
-        along = _dot(g.e3, g.d2)[:, None]
+        along = _dot(g.e3, g.r_ss)[:, None]
         o2 = np.stack([-g.e2, g.e1], axis=1)  # dO_a on dr''
         o1 = np.stack([along * g.e2, -along * g.e1], axis=1)  # on de3
         oa = np.stack([g.bend[:, 1], -g.bend[:, 0]], axis=1)  # on dpsi
         m2, m1 = (np.einsum("iab,ibc->iac", moment.bend_slope, o) for o in (o2, o1))
         ma = np.einsum("iab,ib->ia", moment.bend_slope, oa)
         k1, k2 = moment.bend[:, 0], moment.bend[:, 1]
-        self.across = (np.eye(3) - _outer(g.e3, g.e3)) / g.speed[:, None, None]
+        self.across = (np.eye(3) - _outer(g.e3, g.e3)) / g.metric[:, None, None]
         self.turn = np.cross(g.e3, start.e3) / (1 + _dot(g.e3, start.e3))[:, None]
         # Q and M as vectors: their parts on dr'', de3, dpsi
         swing = k1[:, None] * g.e2 - k2[:, None] * g.e1
@@ -238,7 +240,7 @@ class _Jacobian:
         direct -= _outer(rods._bending_flux(g, moment), b.u) / b.length[:, None, None]
         rigid = (np.eye(3) - _outer(b.u, b.u)) / b.length[:, None, None]  # du = rigid dd
         self.rigid = rigid
-        spin = _skew(_next(g.d1) - g.d1) * (self.m3 / b.length)[:, None, None]
+        spin = _skew(_next(g.r_s) - g.r_s) * (self.m3 / b.length)[:, None, None]
         direct -= spin @ rigid
         rows = np.zeros((len(g.r), 4, 3))
         rows[:, :3] = direct
@@ -249,7 +251,7 @@ class _Jacobian:
         g, mesh, b, n = self.g, self.mesh, self.b, len(self.g.r)
         shift = (lambda x: x) if side else _before
         sign, there = (-1.0, b.has_right) if side else (1.0, b.has_left)
-        inv, half = shift(1.0 / b.length), shift(0.5 * g.gap / mesh.ds[:, None])
+        inv, half = shift(1.0 / b.length), shift(0.5 * g.edge / mesh.ds[:, None])
         inv = np.where(there, inv, 0.0)
         half = np.where(there[:, None], half, 0.0)
         second, slope, spin = np.zeros((n, 4, 3)), np.zeros((n, 4, 3)), np.zeros((n, 4))

@@ -17,14 +17,14 @@ from ..io.pace import Pace
 from ..io.reader import checkpoint_path
 from ..io.writer import GridPlace, Meaning, Recorder, record_end
 from ..observables.expectations import Check, check
-from ..observables.observers import Observers, Summary
+from ..observables.observers import ObservableSet, Summary
 from ..observables.stop_rules import StopRules
 from .progress import Progress, Signals
 from .schedule import SAME, Due, due_times
 
 if TYPE_CHECKING:
     from ..case.schema import Case
-    from ..io.frames import Frame
+    from ..io.snapshots import Snapshot
     from ..simulation.simulation import Simulation
 
 
@@ -35,7 +35,7 @@ _LOOK = 0.2  # seconds between two looks at clocks and progress
 class Result:
     """What a run gave. ``status`` is finished, or stopped for the ``reason`` of a stop rule.
 
-    ``frame`` is the last output; ``path`` the run file, None where none was written; ``wall_time`` in
+    ``snapshot`` is the last output; ``path`` the run file, None where none was written; ``wall_time`` in
     seconds.
     """
 
@@ -45,14 +45,14 @@ class Result:
     path: Path | None
     steps: int
     wall_time: float
-    frame: Frame
-    observers: Observers
+    snapshot: Snapshot
+    observers: ObservableSet
 
     def __repr__(self) -> str:
         found = ", ".join(
             f"{name} = {np.array2string(np.asarray(one.value), precision=6)}" for name, one in self.summaries.items()
         )
-        return f"<Result {self.status}: {self.steps} steps, t = {self.frame.time:g}; {found or 'no observables'}>"
+        return f"<Result {self.status}: {self.steps} steps, t = {self.snapshot.time:g}; {found or 'no observables'}>"
 
     @property
     def times(self) -> np.ndarray:
@@ -80,18 +80,18 @@ class Loop:
     def __init__(
         self,
         simulation: Simulation,
-        seen: Observers,
+        seen: ObservableSet,
         log: Callable[[str], object],
         progress: bool,
         rules: StopRules | None = None,
     ) -> None:
-        self.simulation, self.case, self._seen = simulation, simulation.case, seen
+        self.simulation, self.case, self._observed = simulation, simulation.case, seen
         self._rules = rules or StopRules(self.case, seen)
         self._log, self._show = log, progress
         self._signals = Signals()
         self._recorder: Recorder | None = None
         self._path: Path | None = None
-        self._frame: Frame | None = None
+        self._snapshot: Snapshot | None = None
         self._began, self._spent = clock.monotonic(), 0.0  # now; seconds spent by the parts of the run before
         self._pace = Pace()
         self._next_look = self._next_checkpoint = 0.0
@@ -104,17 +104,17 @@ class Loop:
         self._path = path
 
         def work() -> tuple[str, str]:
-            frame = self._frame = self.simulation.frame(self._fields(first))
-            values = self._seen.take(frame)
+            snapshot = self._snapshot = self.simulation.snapshot(self._fields(first))
+            values = self._observed.record(snapshot)
             if path is not None:
                 meanings = {
                     name: Meaning(observable.dimension, observable.description)
-                    for name, observable in self._seen.observables.items()
+                    for name, observable in self._observed.observables.items()
                 }
                 self._recorder = Recorder.create(
                     path,
                     self.case,
-                    frame,
+                    snapshot,
                     values,
                     meanings,
                     grid=self._grid_place(),
@@ -124,10 +124,10 @@ class Loop:
                     expected=sum(due.output for due in rest) + 1,
                     overwrite=overwrite,
                 )
-                if frame.grid:
-                    self._recorder.append_fields(frame.time, frame.grid)
+                if snapshot.grid:
+                    self._recorder.append_fields(snapshot.time, snapshot.grid)
                 self._checkpoint()
-            reason = self._rules.check(frame.time)
+            reason = self._rules.check(snapshot.time)
             return ("stopped", reason) if reason else self._steps(rest)
 
         return self._guarded(work)
@@ -137,11 +137,11 @@ class Loop:
         self._path, self._spent, self._good = path, last.wall_time, last.time
 
         def work() -> tuple[str, str]:
-            self._frame = self.simulation.frame()
+            self._snapshot = self.simulation.snapshot()
             self._recorder = Recorder.resume(path, self.case, last.outputs, last.fields, self._grid_place())
             self._pace = Pace(self._recorder.pace)
             self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
-            slack, written = SAME * self.case.time.end, float(self._seen.times[-1])
+            slack, written = SAME * self.case.time.end, float(self._observed.times[-1])
             rest = []
             for due in due_times(self.case, self.simulation.grid is not None):
                 output, fields = (
@@ -163,8 +163,8 @@ class Loop:
                 try:
                     simulation.advance(due.time, self._after_step)
                 except Stopped as stopped:
-                    if self._frame is None or simulation.time > self._frame.time:
-                        self._output(simulation.frame())
+                    if self._snapshot is None or simulation.time > self._snapshot.time:
+                        self._output(simulation.snapshot())
                     return "stopped", str(stopped)
             with self._pace.paused():
                 reason = self._look(due)
@@ -174,19 +174,19 @@ class Loop:
 
     def _look(self, due: Due) -> str:
         """What is due now; the stop rule that is true, if one is."""
-        frame = self.simulation.frame(self._fields(due))
-        if due.fields and frame.grid and self._recorder is not None:
-            self._recorder.append_fields(frame.time, frame.grid)
+        snapshot = self.simulation.snapshot(self._fields(due))
+        if due.fields and snapshot.grid and self._recorder is not None:
+            self._recorder.append_fields(snapshot.time, snapshot.grid)
         if not due.output:
             return ""
-        self._output(frame)
-        return self._rules.check(frame.time)
+        self._output(snapshot)
+        return self._rules.check(snapshot.time)
 
-    def _output(self, frame: Frame) -> None:
-        self._frame = frame
-        values = self._seen.take(frame)
+    def _output(self, snapshot: Snapshot) -> None:
+        self._snapshot = snapshot
+        values = self._observed.record(snapshot)
         if self._recorder is not None:
-            self._recorder.append(frame, values)
+            self._recorder.append(snapshot, values)
 
     def _after_step(self) -> None:
         self._pace.step(self.simulation.time)
@@ -285,9 +285,9 @@ class Loop:
         if self._recorder is not None and self._path is not None:
             self._recorder.finish(status, reason, **self._attributes())
             checkpoint_path(self._path).unlink(missing_ok=True)
-        assert self._frame is not None
+        assert self._snapshot is not None
         steps, wall_time = self.simulation.steps, self._wall_time()
-        return Result(self.case, status, reason, self._path, steps, wall_time, self._frame, self._seen)
+        return Result(self.case, status, reason, self._path, steps, wall_time, self._snapshot, self._observed)
 
     def _interrupted(self) -> Interrupted:
         """Write a checkpoint, and say how to go on."""

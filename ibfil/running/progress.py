@@ -63,7 +63,7 @@ class Signals:
         self.caught = False
         self._before: dict[int, Any] = {}
 
-    def _catch(self, number: int, frame: FrameType | None) -> None:
+    def _catch(self, number: int, snapshot: FrameType | None) -> None:
         self.caught = True
         for caught in self._before:
             signal.signal(caught, signal.SIG_DFL)

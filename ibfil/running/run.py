@@ -15,7 +15,7 @@ from ..io.reader import RunFile, RunFileError, checkpoint_path, journal_path
 from ..io.writer import refuse_existing
 from ..observables.base import Observable
 from ..observables.factory import observers
-from ..observables.observers import Observers
+from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
 from .loop import Loop, Result
 
@@ -87,7 +87,7 @@ def resume_run(
 
     The case is the one it began with, or ``case``, or that with ``overrides``: only time.end and output may
     differ. The run file is cut back to the checkpoint; a torn one is put right, and one damaged beyond that
-    is computed anew. ``laws`` made in Python have to be given again. Raises as `run`, and RunFileError (a
+    is computed again. ``laws`` made in Python have to be given again. Raises as `run`, and RunFileError (a
     CaseError) where there is nothing to go on from.
     """
     path, build = Path(path), build or _builder(laws)
@@ -170,7 +170,7 @@ def _goes_on(began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
     return case
 
 
-def _replay(path: Path, last: checkpoint.Checkpoint, seen: Observers, rules: StopRules) -> tuple[float, str]:
+def _replay(path: Path, last: checkpoint.Checkpoint, seen: ObservableSet, rules: StopRules) -> tuple[float, str]:
     """Show the outputs up to the checkpoint to all that looks.
 
     Gives the time of the last fields, -1 if there are none, and in words which versions have changed. Raises
@@ -182,9 +182,9 @@ def _replay(path: Path, last: checkpoint.Checkpoint, seen: Observers, rules: Sto
         grid = run_file.grid
         if len(run_file) < last.outputs or (0 if grid is None else len(grid.time)) < last.fields:
             raise RunFileError(f"{path}: ends before its checkpoint")
-        for frame in run_file.frames(0, last.outputs):
-            seen.take(frame)
-            rules.check(frame.time)
+        for snapshot in run_file.snapshots(0, last.outputs):
+            seen.record(snapshot)
+            rules.check(snapshot.time)
         began, now = run_file.versions, versions()
         other = [f"{name} is {v}, was {began.get(name, 'none')}" for name, v in now.items() if v != began.get(name)]
         fields_at = -1.0 if grid is None or last.fields == 0 else float(grid.time[last.fields - 1])

@@ -1,4 +1,4 @@
-"""When a run puts out what."""
+"""When a run writes what."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SAME = 1e-9  # of the run's length: times nearer than that are one
 
 
 class Due(NamedTuple):
-    """A time at which the filaments are put out, or fields, or both."""
+    """A time at which the filaments are written, or fields, or both."""
 
     time: float
     output: bool

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rods.frame import carry
+from ..rods.frame import transport
 
 Strains = Callable[[np.ndarray], np.ndarray]  # s (n,) -> O1, O2, O3 (n, 3)
 Formula = Callable[[np.ndarray], np.ndarray]  # s (n,) -> r (n, 3)
@@ -147,7 +147,7 @@ def curve_from_formula(formula: Formula, s: np.ndarray) -> Curve:
     """
     slope = derivative(formula, s)
     middle = formula(np.array([0.5 * (s[0] + s[-1])]))[0]
-    return Curve(formula(s), slope, carried_frame(slope), middle, None)
+    return Curve(formula(s), slope, transported_frame(slope), middle, None)
 
 
 def derivative(formula: Formula, s: np.ndarray) -> np.ndarray:
@@ -159,7 +159,7 @@ def derivative(formula: Formula, s: np.ndarray) -> np.ndarray:
     return np.asarray(((q - 1.5) * f0 + (2.0 - 2.0 * q) * f1 + (q - 0.5) * f2) / h)
 
 
-def carried_frame(slope: np.ndarray) -> np.ndarray:
+def transported_frame(slope: np.ndarray) -> np.ndarray:
     """Carry e1 (N, 3) from the curve's own z (or x) axis along ``slope`` (N, 3), without twist (Eq. 41)."""
     tangent = unit(slope)
     lost = np.nonzero(~np.all(np.isfinite(tangent), axis=1))[0]
@@ -169,7 +169,7 @@ def carried_frame(slope: np.ndarray) -> np.ndarray:
     e1 = np.empty_like(tangent)
     e1[0] = perpendicular(own, tangent[0])
     for i in range(len(tangent) - 1):
-        e1[i + 1 : i + 2], left = carry(e1[i : i + 1], tangent[i : i + 1], tangent[i + 1 : i + 2], np.zeros(1))
+        e1[i + 1 : i + 2], left = transport(e1[i : i + 1], tangent[i : i + 1], tangent[i + 1 : i + 2], np.zeros(1))
         if left < 1e-6:
             raise ValueError(f"the tangent reverses between nodes {i} and {i + 1}")
     return e1

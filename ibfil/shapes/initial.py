@@ -42,7 +42,7 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
       (``stretch_warning``); e1 without twist.
     * file: points in the file (``shape_points.curve_from_points``), relative to ``folder``.
     * run: as the filament of the same name, which ``key`` ends with, stood in a run (``shape_from_run``), relative to
-      ``folder``; it is not placed anew.
+      ``folder``; it is not placed again.
 
     Raises CaseError, one line beginning with ``key``, where the shape cannot be made.
     """

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .curves import Curve, carried_frame, perpendicular, unit
+from .curves import Curve, perpendicular, transported_frame, unit
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -104,7 +104,7 @@ def curve_from_points(table: np.ndarray, s: np.ndarray) -> Curve:
         places, length = _at_fractions(spline, (np.append(s, half) - s[0]) / (s[-1] - s[0]))
         at, middle, rows = places[:-1], places[-1], spline(places[:-1])
         slope = unit(spline(at, 1)[:, :3]) * length / (s[-1] - s[0])
-    e1 = carried_frame(slope) if table.shape[1] == 3 else perpendicular(unit(rows[:, 3:]), unit(slope))
+    e1 = transported_frame(slope) if table.shape[1] == 3 else perpendicular(unit(rows[:, 3:]), unit(slope))
     if not np.all(np.isfinite(e1)):
         raise ValueError("e1 vanishes or lies along the curve")
     return Curve(rows[:, :3], slope, e1, spline(middle)[:3], None)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..io.frames import FilamentFrame, Frame
+from ..io.snapshots import FilamentSnapshot, Snapshot
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-class Instant(NamedTuple):
+class SolvedState(NamedTuple):
     """A simulation at one instant: the state, and velocity, force on the fluid, reaction (n, m) of the step to it."""
 
     state: State
@@ -32,70 +32,70 @@ class Diagnostics:
     """Takes frames of one scene. Fields cost an evaluation of the fluid; their plans are made at the first."""
 
     def __init__(self, model: Model) -> None:
-        self._model, self._rods, self._mechanics = model, model.rods, model.rods.mechanics
+        self._model, self._rods, self._mechanics = model, model.rods, model.rods.system
 
     @cached_property
     def _output(self) -> FluidOutput:
-        """What the fluid puts out, made when it is first asked for."""
+        """What the fluid writes, made when it is first asked for."""
         return self._model.fluid_model.output(self._rods, self._model.fluid)
 
-    def frame(self, now: Instant, fields: Sequence[str] = ()) -> Frame:
+    def snapshot(self, now: SolvedState, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments with diagnostics, and the ``fields`` named."""
-        shape = now.state.shape
+        configuration = now.state.configuration
         moment, strain = self._nodal_moment(now.state)
         filaments = {}
         for name, description, where in zip(self._rods.names, self._rods.filaments, self._rods.nodes, strict=True):
             segment = slice(where.start, where.stop - 1)
-            stretch = shape.length[segment] / self._mechanics.mesh.ds[segment] - 1.0
+            stretch = configuration.length[segment] / self._mechanics.mesh.ds[segment] - 1.0
             ends = (
                 now.reaction[i, :3].copy() if end.held else None
                 for i, end in ((where.start, description.start), (where.stop - 1, description.finish))
             )
-            filaments[name] = FilamentFrame(
-                shape.r[where].copy(),
+            filaments[name] = FilamentSnapshot(
+                configuration.r[where].copy(),
                 now.velocity[where, :3].copy(),
                 now.force[where, :3].copy(),
-                shape.e1[where].copy(),
+                configuration.e1[where].copy(),
                 moment[where],
                 strain[where],
                 self._mechanics.stretching[segment] * stretch,
                 *ends,
                 **self._twisting(description, now, where),
             )
-        grid = self._output.evaluate(shape, now.force, now.state.time, fields) if fields else None
-        return Frame(now.state.time, filaments, self._of_all(now), grid)
+        grid = self._output.evaluate(configuration, now.force, now.state.time, fields) if fields else None
+        return Snapshot(now.state.time, filaments, self._of_all(now), grid)
 
-    def _twisting(self, filament: Filament, now: Instant, where: slice) -> dict[str, np.ndarray]:
+    def _twisting(self, filament: Filament, now: SolvedState, where: slice) -> dict[str, np.ndarray]:
         """The twist torque and the spin (N, 3) of a filament that twists, by name."""
         if filament.twisting is None:
             return {}
-        e3 = now.state.shape.e3[where]
+        e3 = now.state.configuration.e3[where]
         return {"torque": now.force[where, 3:] * e3, "spin": now.velocity[where, 3:] * e3}
 
     def _nodal_moment(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""
-        shape, mesh = state.shape, self._mechanics.mesh
-        moment = self._mechanics.moment(shape, state.time)
+        configuration, mesh = state.configuration, self._mechanics.mesh
+        moment = self._mechanics.moment(configuration, state.time)
         beside = mesh.joined.astype(float) + np.append(False, mesh.joined[:-1])
         thirds = []
-        for half in (moment.twist, shape.twist):
+        for half in (moment.twist, configuration.twist):
             half = np.where(mesh.joined, half, 0.0)
             thirds.append((half + np.append(0.0, half[:-1])) / beside)
         nodal = np.column_stack([moment.bend, thirds[0]])
         for load in self._mechanics.loads:
-            given = load.end_moment(shape, state.time)
+            given = load.end_moment(configuration, state.time)
             if given is not None:  # the law's own is zero there
                 i, vector = given
-                nodal[i] = np.stack([shape.e1[i], shape.e2[i], shape.e3[i]]) @ vector
-        return nodal, np.column_stack([shape.bend, thirds[1]])
+                nodal[i] = np.stack([configuration.e1[i], configuration.e2[i], configuration.e3[i]]) @ vector
+        return nodal, np.column_stack([configuration.bend, thirds[1]])
 
-    def _of_all(self, now: Instant) -> dict[str, float | np.ndarray]:
+    def _of_all(self, now: SolvedState) -> dict[str, float | np.ndarray]:
         """The diagnostics of all filaments together, by name."""
-        shape, mesh, force = now.state.shape, self._mechanics.mesh, now.force
-        stretch = (shape.length / mesh.ds)[mesh.joined] - 1.0
-        torque = np.cross(shape.r, force[:, :3]).sum(axis=0)
+        configuration, mesh, force = now.state.configuration, self._mechanics.mesh, now.force
+        stretch = (configuration.length / mesh.ds)[mesh.joined] - 1.0
+        torque = np.cross(configuration.r, force[:, :3]).sum(axis=0)
         if force.shape[1] == 4:
-            torque = torque + (force[:, 3:] * shape.e3).sum(axis=0)
+            torque = torque + (force[:, 3:] * configuration.e3).sum(axis=0)
         out: dict[str, float | np.ndarray] = {
             "net_force": force[:, :3].sum(axis=0),
             "net_torque": torque,
@@ -108,7 +108,7 @@ class Diagnostics:
         case, fluid = self._model.case, self._model.fluid
         if case.output.probes and self._model.grid is not None:
             points = np.array(case.output.probes)
-            out["probe_velocity"] = fluid.velocity_at(points, shape.r, shape.e3, force, now.state.time)
+            out["probe_velocity"] = fluid.velocity_at(points, configuration.r, configuration.e3, force, now.state.time)
         if case.dissipation_observed:
-            out |= self._output.dissipation(shape, now.velocity, force, now.state.time)
-        return out | self._rods.contact.diagnostics(shape.r)
+            out |= self._output.dissipation(configuration, now.velocity, force, now.state.time)
+        return out | self._rods.contact.diagnostics(configuration.r)

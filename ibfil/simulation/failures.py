@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..rods.geometry import Geometry
+from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
 
 LONGEST, SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
@@ -18,13 +18,13 @@ LARGEST_TWIST = 0.95  # of sin(O3 ds): Eq. 39 stops resisting at 1
 UNBOUNDED = "a load, a law or a flow that grows without bound, or has no value, where the rod has come to"
 
 
-class Trouble(NamedTuple):
+class Failure(NamedTuple):
     """A step that led out of bounds: what was found and allowed, at which node if one is to blame, why, the cure."""
 
     message: str
     node: int | None
     cause: str
-    cure: str
+    remedy: str
 
 
 class Step(NamedTuple):
@@ -42,7 +42,7 @@ class Step(NamedTuple):
             return f"thermal kicks turn segments further within dt = {self.dt:.3g} than the linearised step follows"
         return otherwise
 
-    def cure(self, otherwise: str) -> str:
+    def remedy(self, otherwise: str) -> str:
         """What to change then."""
         if self.dt > self.limit:
             return f"time.step below {self.limit:.3g}, or time.scheme=implicit"
@@ -75,10 +75,10 @@ class Diverged(NamedTuple):
 
     node: int
 
-    def trouble(self, step: Step) -> Trouble:
+    def trouble(self, step: Step) -> Failure:
         """What to say of it."""
         message = f"the run diverged: a position is no finite number any more (dt = {step.dt:.3g})"
-        return Trouble(message, self.node, step.cause(UNBOUNDED), step.cure("the loads, law or fluid.flow"))
+        return Failure(message, self.node, step.cause(UNBOUNDED), step.remedy("the loads, law or fluid.flow"))
 
 
 class OverStretched(NamedTuple):
@@ -88,13 +88,13 @@ class OverStretched(NamedTuple):
     ratio: float
     stretching: float
 
-    def trouble(self, step: Step) -> Trouble:
+    def trouble(self, step: Step) -> Failure:
         """What to say of it."""
         message = f"a segment is {self.ratio:.3g} times its rest length (allowed {SHORTEST} to {LONGEST})"
         pull = f"about {abs(self.ratio - 1.0) * self.stretching:.3g}, more than its EA = {self.stretching:.3g} bears"
         cause = step.cause(f"the rod is pulled or pressed with {pull}")
-        cure = step.cure("a larger stretching, smaller loads, or a shorter time.step")
-        return Trouble(message, self.node, cause, cure)
+        remedy = step.remedy("a larger stretching, smaller loads, or a shorter time.step")
+        return Failure(message, self.node, cause, remedy)
 
 
 class OverTwisted(NamedTuple):
@@ -103,21 +103,23 @@ class OverTwisted(NamedTuple):
     node: int
     sine: float
 
-    def trouble(self, step: Step) -> Trouble:
+    def trouble(self, step: Step) -> Failure:
         """What to say of it."""
         message = f"the twist between two nodes nears a quarter turn: sin = {self.sine:.3g} (allowed {LARGEST_TWIST})"
         cause = step.cause("the rod is wound up faster than it unwinds, until Eq. 39 stops resisting")
-        return Trouble(message, self.node, cause, step.cure("more nodes, a slower spin, a larger twisting"))
+        return Failure(message, self.node, cause, step.remedy("more nodes, a slower spin, a larger twisting"))
 
 
 def out_of_bounds(
-    mesh: Mesh, twisting: np.ndarray, stretching: np.ndarray, shape: Geometry
+    mesh: Mesh, twisting: np.ndarray, stretching: np.ndarray, configuration: Configuration
 ) -> Diverged | OverStretched | OverTwisted | None:
     """The bound that the configuration is beyond; None within all of them.
 
     ``twisting`` (n,) is True at nodes of filaments that twist, ``stretching`` (n,) is EA at half nodes.
     """
-    high, low, turn, where, bad = _survey(mesh.joined, twisting, mesh.ds, shape.r, shape.length, shape.twist)
+    high, low, turn, where, bad = _survey(
+        mesh.joined, twisting, mesh.ds, configuration.r, configuration.length, configuration.twist
+    )
     if bad >= 0:
         return Diverged(bad)
     longest, shortest, twisted = (int(node) for node in where)
@@ -128,24 +130,24 @@ def out_of_bounds(
     return OverTwisted(twisted, turn) if turn > LARGEST_TWIST else None
 
 
-def too_many(steps: int, most: int, end: float, dt: float) -> Trouble:
+def too_many(steps: int, most: int, end: float, dt: float) -> Failure:
     """More steps than the case allows."""
     message = f"{steps} steps are taken (allowed: time.max_steps = {most})"
     cause = f"steps of {dt:.3g} for a time.end of {end:g}"
-    return Trouble(message, None, cause, "a larger time.max_steps, a longer time.step, or a larger time.tolerance")
+    return Failure(message, None, cause, "a larger time.max_steps, a longer time.step, or a larger time.tolerance")
 
 
-def unsolved(reason: str, dt: float, smallest: float, node: int | None, step: Step) -> Trouble:
+def unsolved(reason: str, dt: float, smallest: float, node: int | None, step: Step) -> Failure:
     """A step that Newton's iteration or the linear solve did not find, however short."""
     message = f"{reason} (dt = {dt:.3g}; time.min_step = {smallest:.3g} ends the halving)"
     if "diverged" in reason:
-        return Trouble(
-            message, node, step.cause(UNBOUNDED), step.cure("the loads, law or fluid.flow, or a shorter time.step")
+        return Failure(
+            message, node, step.cause(UNBOUNDED), step.remedy("the loads, law or fluid.flow, or a shorter time.step")
         )
     cause = "a rod that snaps, or loads, a law or contact stiffer than any step: no shorter one helped"
-    return Trouble(
+    return Failure(
         message,
         node,
         step.cause(cause),
-        step.cure("softer loads or law, more nodes, or a smaller time.step and time.min_step"),
+        step.remedy("softer loads or law, more nodes, or a smaller time.step and time.min_step"),
     )

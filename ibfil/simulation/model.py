@@ -14,7 +14,7 @@ from ..assembly.fluids.models import fluid_model
 
 if TYPE_CHECKING:
     from ..assembly.fluids.base import FluidModel
-    from ..assembly.stacked import Stacked
+    from ..assembly.stacked import RodStack
     from ..case.schema import Case
     from ..fluids.base import Fluid
     from ..grid.periodic_grid import Grid
@@ -31,7 +31,7 @@ class Model:
     """
 
     case: Case
-    rods: Stacked
+    rods: RodStack
     fluid_model: FluidModel
     fluid: Fluid
     method: str

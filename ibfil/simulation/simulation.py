@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import CaseError, RunFailed
-from ..linalg.constraints import Held
-from ..rods.geometry import Geometry
+from ..linalg.constraints import Prescribed
+from ..rods.geometry import Configuration
 from ..timestepping.base import FAILURES, State, Step
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import Verdict
 from . import failures, timescales
-from .diagnostics import Diagnostics, Instant
+from .diagnostics import Diagnostics, SolvedState
 from .model import assemble
 
 if TYPE_CHECKING:
-    from ..assembly.stacked import Stacked
+    from ..assembly.stacked import RodStack
     from ..case.schema import Case
     from ..fluids.base import Fluid
     from ..grid.periodic_grid import Grid
-    from ..io.frames import Frame
+    from ..io.snapshots import Snapshot
     from ..rods.constitutive import MomentLaw
-    from ..rods.system import Mechanics
+    from ..rods.system import RodSystem
 
 
 class Simulation:
@@ -41,7 +41,7 @@ class Simulation:
         self._laws = ", ".join(f"{name}: {type(law).__qualname__}" for name, law in sorted(laws.items()))
         self.model = assemble(case, laws, wisdom)
         self._diagnostics = Diagnostics(self.model)
-        self.state_now = State(0.0, self.start, np.zeros((len(self.arclength), self.mechanics.unknowns)), 0.0)
+        self.state_now = State(0.0, self.start, np.zeros((len(self.arclength), self.system.unknowns)), 0.0)
         self.steps = self._iterations = 0
         self.notices: list[str] = []  # what has happened and nobody was told yet
         self._told = False  # that the fluid moves too far in a step
@@ -51,14 +51,14 @@ class Simulation:
     # -- what it is made of --------------------------------------------------------------------------------------
 
     @property
-    def rods(self) -> Stacked:
+    def rods(self) -> RodStack:
         """The rods of the scene."""
         return self.model.rods
 
     @property
-    def mechanics(self) -> Mechanics:
+    def system(self) -> RodSystem:
         """What the rods answer: forces, stiffness."""
-        return self.model.rods.mechanics
+        return self.model.rods.system
 
     @property
     def fluid(self) -> Fluid:
@@ -81,12 +81,12 @@ class Simulation:
         return self.state_now.time
 
     @property
-    def shape(self) -> Geometry:
+    def configuration(self) -> Configuration:
         """The present configuration of all nodes."""
-        return self.state_now.shape
+        return self.state_now.configuration
 
     @property
-    def start(self) -> Geometry:
+    def start(self) -> Configuration:
         """The configuration the case begins with."""
         return self.model.rods.start
 
@@ -146,8 +146,8 @@ class Simulation:
 
     def attempt(self, dt: float) -> Step:
         """A step of length dt from the present state, not yet taken."""
-        step = self.model.stepper.step(self.mechanics, self.fluid, self.state_now, dt)
-        self.rods.contact.refuse_passing(self.shape.r, step.state.shape.r)
+        step = self.model.stepper.step(self.system, self.fluid, self.state_now, dt)
+        self.rods.contact.refuse_passing(self.configuration.r, step.state.configuration.r)
         return step
 
     def _refuse(self, dt: float, reason: str, node: int | None = None) -> None:
@@ -191,12 +191,12 @@ class Simulation:
             limits = self.case.time
             self._fail(failures.too_many(self.steps, limits.max_steps, limits.end, time - before.time))
         self._iterations = step.iterations
-        self._look_at_bounds(step.state.shape, time - before.time)
+        self._look_at_bounds(step.state.configuration, time - before.time)
         self._watch(before)
 
-    def _look_at_bounds(self, shape: Geometry, dt: float) -> None:
-        rods = self.mechanics
-        found = failures.out_of_bounds(rods.mesh, self._twisting, rods.stretching, shape)
+    def _look_at_bounds(self, configuration: Configuration, dt: float) -> None:
+        rods = self.system
+        found = failures.out_of_bounds(rods.mesh, self._twisting, rods.stretching, configuration)
         if found is not None:
             self._fail(found.trouble(self._known(dt)))
 
@@ -208,7 +208,7 @@ class Simulation:
 
     def _known(self, dt: float) -> failures.Step:
         """What is known of a step that failed; the limit is that of the start, where the present is not finite."""
-        limit = explicit_limit(self.mechanics, self.fluid, self.start, 0.0) if self.case.time.explicit else np.inf
+        limit = explicit_limit(self.system, self.fluid, self.start, 0.0) if self.case.time.explicit else np.inf
         return failures.Step(dt, limit, self.case.thermal is not None and self.case.thermal.energy > 0)
 
     def _look_at_crossing(self, dt: float) -> None:
@@ -224,30 +224,30 @@ class Simulation:
     def _watch(self, before: State) -> None:
         """Looks for a contact since ``before``, where the case has [contact]."""
         now = self.state_now
-        told = self.rods.contact.watch(before.shape.r, now.shape.r, before.time, now.time)
+        told = self.rods.contact.watch(before.configuration.r, now.configuration.r, before.time, now.time)
         self.notices += [told] if told else []
 
-    def _fail(self, trouble: failures.Trouble) -> None:
-        message, node, cause, cure = trouble
+    def _fail(self, trouble: failures.Failure) -> None:
+        message, node, cause, remedy = trouble
         if node is None:
-            raise RunFailed(message, time=self.time, cause=cause, advice=cure)
+            raise RunFailed(message, time=self.time, cause=cause, advice=remedy)
         name, local = self.model.rods.locate(node)
-        raise RunFailed(message, time=self.time, filament=name, node=local, cause=cause, advice=cure)
+        raise RunFailed(message, time=self.time, filament=name, node=local, cause=cause, advice=remedy)
 
     # -- its speeds ----------------------------------------------------------------------------------------------
 
     def driving_rates(self) -> list[float]:
         """How fast the scene is driven, radians per time: by what changes in time, and by what pushes."""
-        return self.cycles + self._pushes
+        return self.forcing_rates + self._load_rates
 
     @cached_property
-    def cycles(self) -> list[float]:
+    def forcing_rates(self) -> list[float]:
         """How fast it is driven by what changes in time."""
-        return timescales.cycles(self.model)
+        return timescales.forcing_rates(self.model)
 
     @cached_property
-    def _pushes(self) -> list[float]:
-        return timescales.pushes(self.model)
+    def _load_rates(self) -> list[float]:
+        return timescales.load_rates(self.model)
 
     def drag(self, filament) -> float:
         """A drag per length across, for time scales: the case's own in RFT, 4 pi eta on a grid."""
@@ -263,27 +263,29 @@ class Simulation:
 
     def explicit_limit(self) -> float:
         """The largest stable step of the explicit scheme at the present configuration, 2/rho(M K)."""
-        return explicit_limit(self.mechanics, self.fluid, self.shape, self.time)
+        return explicit_limit(self.system, self.fluid, self.configuration, self.time)
 
     # -- what is looked at ---------------------------------------------------------------------------------------
 
     def _motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Velocity, force on the fluid and reaction (n, m): of the last step, or of the start."""
         if self._last is None:
-            force, _ = self.mechanics.forces(self.state_now.shape, self.time)
+            force, _ = self.system.forces(self.state_now.configuration, self.time)
             small, dt = 1e-6 * self.case.time.end / 1000, self.step_length
-            index, value = self.mechanics.held(self.time, self.time + small)
+            index, value = self.system.held(self.time, self.time + small)
             # Over a whole step at the speeds of this moment: a fluid with inertia resists a sudden start without limit.
-            held = Held(index, value * (dt / small))
-            response = self.fluid.response(self.state_now.shape.r, self.state_now.shape.e3, self.time, dt)
+            held = Prescribed(index, value * (dt / small))
+            response = self.fluid.response(
+                self.state_now.configuration.r, self.state_now.configuration.e3, self.time, dt
+            )
             answer = response.forced(force, held, np.zeros_like(force))
             self._last = (answer.move / dt, answer.force, answer.reaction)
         return self._last
 
-    def frame(self, fields: Sequence[str] = ()) -> Frame:
+    def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
-        now = Instant(self.state_now, *self._motion(), self._iterations, self.shortened)
-        return self._diagnostics.frame(now, fields)
+        now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened)
+        return self._diagnostics.snapshot(now, fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
 
@@ -295,7 +297,7 @@ class Simulation:
             "steps": self.steps,
             "iterations": self._iterations,
             # Whole: measured again from r and e1 it may differ in the last bit (compilers fuse a b + c as they like).
-            "shape": self.state_now.shape.table,
+            "shape": self.state_now.configuration.table,
             "start": self.start.r,
             "y_old": self.state_now.y_old,
             "dt_old": self.state_now.dt_old,
@@ -321,8 +323,8 @@ class Simulation:
         array = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
         number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
         self._same_start(array["start"])
-        shape = Geometry(array["shape"])
-        self.state_now = State(number["time"], shape, array["y_old"], number["dt_old"])
+        configuration = Configuration(array["shape"])
+        self.state_now = State(number["time"], configuration, array["y_old"], number["dt_old"])
         self._last = (array["velocity"], array["force"], array["reaction"])
         self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
         control = {k.removeprefix("control_"): v for k, v in (array | number).items() if k.startswith("control_")}
@@ -338,7 +340,7 @@ class Simulation:
         """Clamps and tethers hold the start shape, so it must be the one the run began with."""
         for name, where in zip(self.model.rods.names, self.model.rods.nodes, strict=True):
             moved = float(np.max(np.linalg.norm(self.start.r[where] - began[where], axis=1)))
-            if moved > 1e-9 * self.mechanics.length:  # another machine may differ in the last bits
+            if moved > 1e-9 * self.system.length:  # another machine may differ in the last bits
                 found = f"a start shape that differs by {moved:.3g} from the one the run began with"
                 allowed = "the file or run it is read from, as it was"
                 raise CaseError([f"{self.case.file}: filament.{name}.shape: found {found}; allowed: {allowed}"])

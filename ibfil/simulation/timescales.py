@@ -49,7 +49,7 @@ def angular_rate(value: Callable[[float], np.ndarray], end: float) -> float:
     return fastest / size if size > 0 else 0.0
 
 
-def cycles(model: Model) -> list[float]:
+def forcing_rates(model: Model) -> list[float]:
     """The rates of all that is prescribed to change in time: strains, spins, moving ends, loads, the flow."""
     case, end, rates = model.case, model.case.time.end, []
     for filament in case.filaments.values():
@@ -79,7 +79,7 @@ def _is_load(path: str) -> bool:
     return path.startswith("loads.") and not _is_strain(path)
 
 
-def pushes(model: Model) -> list[float]:
+def load_rates(model: Model) -> list[float]:
     """The rates of what pushes without a period: a turn is the time in which it moves a rod by its own length.
 
     A force F does that in zeta L^2/F, a flow in L over its change along the rod.
@@ -87,7 +87,7 @@ def pushes(model: Model) -> list[float]:
     case, rates, fluid = model.case, [], model.fluid_model
     times = np.linspace(0.0, case.time.end, 101)
     slowest = min(fluid.drag(f) * f.length**2 for f in case.filaments.values())
-    for load in model.rods.mechanics.loads:
+    for load in model.rods.system.loads:
         if load.drives:
             size = max(float(np.linalg.norm(_force(model, load, t), axis=1).sum()) for t in times)
             rates.append(2 * np.pi * size / slowest)
@@ -114,15 +114,15 @@ def _rates_of_end(end: End, horizon: float) -> Iterator[float]:
 
 def _force(model: Model, load, time: float) -> np.ndarray:
     """What a load puts on the nodes of the start shape (n, 3)."""
-    force = np.zeros((len(model.rods.s), model.rods.mechanics.unknowns))
+    force = np.zeros((len(model.rods.s), model.rods.system.unknowns))
     load.add_force(model.rods.start, time, force)
     return force[:, :3]
 
 
 def _applied(model: Model, time: float) -> np.ndarray:
     """All loads on the nodes of the start shape (n, m)."""
-    force = np.zeros((len(model.rods.s), model.rods.mechanics.unknowns))
-    for load in model.rods.mechanics.loads:
+    force = np.zeros((len(model.rods.s), model.rods.system.unknowns))
+    for load in model.rods.system.loads:
         load.add_force(model.rods.start, time, force)
     return force
 
@@ -155,12 +155,12 @@ def stretch_by_kicks(model: Model, dt: float) -> float:
     return max(thermal_stretch(energy, drag(f), softest(f), f.length, f.nodes, dt) for f in filaments)
 
 
-def implicit_step(cycles: list[float], pushes: list[float], slowest: float) -> float:
+def implicit_step(forcing_rates: list[float], load_rates: list[float], slowest: float) -> float:
     """1/25 of the shortest period of what drives the rods, by the rates (radians per time) of `cycles` and `pushes`.
 
     Where nothing changes in time, no longer than 1/25 of the slowest bending time either: the rods go to rest in that.
     """
-    rates = cycles + pushes if cycles else [*pushes, 2 * np.pi / slowest]
+    rates = forcing_rates + load_rates if forcing_rates else [*load_rates, 2 * np.pi / slowest]
     return float(2 * np.pi / max(rates) / POINTS_A_PERIOD)
 
 
@@ -186,7 +186,7 @@ def control(model: Model) -> StepControl:
     if time.tolerance is None:
         return FixedStep(step, 2.0 if model.stepper.order == 2 else np.inf)
     rate = 2 * np.pi / (POINTS_A_PERIOD * step)
-    return AdaptiveStep(time.tolerance, rate, time.end, time.order, model.rods.mechanics.length)
+    return AdaptiveStep(time.tolerance, rate, time.end, time.order, model.rods.system.length)
 
 
 def first_step(model: Model) -> float:
@@ -196,12 +196,12 @@ def first_step(model: Model) -> float:
         return float(time.step)
 
     def limit() -> float:
-        return explicit_limit(rods.mechanics, model.fluid, rods.start, 0.0)
+        return explicit_limit(rods.system, model.fluid, rods.start, 0.0)
 
     if time.explicit:
         return 0.5 * limit()
     slowest = slowest_bending(model)
-    step = implicit_step(cycles(model), pushes(model), slowest)
+    step = implicit_step(forcing_rates(model), load_rates(model), slowest)
     if model.noise is not None:
         # The trapezoid forgets its stiffest mode in dt^2/(2 limit): no later than the softest is forgotten.
         step = min(step, float(np.sqrt(2 * limit() * slowest)))

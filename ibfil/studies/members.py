@@ -33,7 +33,7 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.,=+-]*")  # becomes the name of a f
 _WORDS = {"title", "source", "expect"}  # what a case may say otherwise and still be the same run
 _LOOK = 0.2  # seconds between two looks at signals, of an executor given
 
-Say = Callable[[str], object]
+Log = Callable[[str], object]
 
 
 def run_members(
@@ -42,13 +42,13 @@ def run_members(
     *,
     jobs: int = 1,
     executor: Executor | None = None,
-    say: Say = print,
+    log: Log = print,
 ) -> list[Outcome]:
     """Run what is not done, ``jobs`` at a time in processes of one thread each; the outcomes in the order given.
 
     ``executor`` is any of concurrent.futures, a cluster's for instance: `work` and its arguments can be pickled,
     and the folder must be the same on all its machines. With one job and no executor they run in this process.
-    ``say`` is told a line when a member ends. A run that failed for reasons of the scene counts as known until
+    ``log`` is told a line when a member ends. A run that failed for reasons of the scene counts as known until
     its case or the versions change, and is not tried again.
 
     Raises CaseError where two members have one name or one cannot be that of a file, or the folder cannot be
@@ -61,16 +61,16 @@ def run_members(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError([f"{folder}: cannot be made ({error.strerror})"]) from None
-    outcomes = {member.name: _standing(member, folder, say) for member in members}
+    outcomes = {member.name: _standing(member, folder, log) for member in members}
     for known in outcomes.values():
         if not known.done and known.status != "waiting":
-            say(_line(known))
+            log(_line(known))
     todo = [member for member in members if outcomes[member.name].status == "waiting"]
     ended = len(members) - len(todo)
     for outcome in _run_all(todo, folder, jobs, executor):
         outcomes[outcome.member.name] = outcome
         ended += outcome.status != "interrupted"
-        say(f"{_line(outcome)} ({ended} of {len(members)})")
+        log(f"{_line(outcome)} ({ended} of {len(members)})")
     if any(outcome.status in ("interrupted", "waiting") for outcome in outcomes.values()):
         done = sum(outcome.done for outcome in outcomes.values())
         raise Interrupted(f"interrupted; {done} of {len(members)} runs are done; the same command goes on")
@@ -141,7 +141,7 @@ def _differing(a: Case, b: Case) -> list[str]:
     return [key for key in keys if key.split(".")[0] not in _WORDS and key != "output.checkpoint_every"]
 
 
-def _standing(member: Member, folder: Path, say: Say) -> Outcome:
+def _standing(member: Member, folder: Path, log: Log) -> Outcome:
     """How far a member is: as its file says, failed where its case is at fault, waiting where there is work to do."""
     from ..io.reader import RunFile, RunFileError
 
@@ -157,14 +157,14 @@ def _standing(member: Member, folder: Path, say: Say) -> Outcome:
             status, reason, written_by = run.status, run.reason, run.versions
             changed = _differing(run.case, case)
     except RunFileError as damage:
-        say(f"{member.name}: {damage}")
+        log(f"{member.name}: {damage}")
         return Outcome(member, "waiting", path)
     except CaseError:  # a case of another version of ibfil
         status, reason, written_by, changed = "cut", "", {}, ["its keys"]
     if status == "running":
         return Outcome(member, status, path, "is being written by another ibfil")
     if changed:
-        say(f"{member.name}: what is there is of another case ({', '.join(changed)}); computed anew")
+        log(f"{member.name}: what is there is of another case ({', '.join(changed)}); computed again")
     again = changed or status in ("cut", "interrupted") or (status == "failed" and not _known(reason, written_by))
     return Outcome(member, "waiting" if again else status, path, "" if again else reason.replace("\n", "; "))
 

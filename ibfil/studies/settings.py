@@ -99,7 +99,7 @@ def combinations(axes: Sequence[Axis]) -> list[Setting]:
     short = {key: tail if tails.count(tail) == 1 else key for key, tail in zip(keys, tails, strict=True)}
     settings: dict[str, Setting] = {}
     for places in product(*(one.values for one in axes)):
-        values = dict(zip(keys, (text for place in places for text in place), strict=True))
+        values = dict(zip(keys, (text for location in places for text in location), strict=True))
         name = _name({short[key]: value for key, value in values.items()})
         if name in settings:  # texts that differ in nothing a name can show
             name += "-" + _hash(values)

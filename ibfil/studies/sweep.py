@@ -46,7 +46,7 @@ def sweep(
     *,
     jobs: int = 1,
     executor: Executor | None = None,
-    say: Callable[[str], object] = print,
+    log: Callable[[str], object] = print,
 ) -> list[Swept]:
     """Run every combination that is not done yet, and write ``folder``/sweep.csv and .json (with versions, machine).
 
@@ -54,7 +54,7 @@ def sweep(
     all combinations are at fault, and Interrupted as `run_members`.
     """
     settings = combinations(axes)
-    outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, say=say)
+    outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, log=log)
     rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
     table = [row.row() for row in rows]
     write_csv(Path(folder) / TABLE, table)

@@ -81,9 +81,11 @@ def shown(value: Any, digits: int = 4) -> str:
     return f"{value:.{digits}g}" if isinstance(value, float) else "" if value is None else str(value)
 
 
-def write_json(path: Path, told: Mapping[str, Any]) -> None:
+def write_json(path: Path, message: Mapping[str, Any]) -> None:
     """Write JSON; what is not finite becomes null."""
-    path.write_text(json.dumps(_finite(told), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(
+        json.dumps(_finite(message), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
+    )
 
 
 def _finite(value: Any) -> Any:

@@ -26,7 +26,7 @@ class Planned:
     expects: dict[str, Case]
 
 
-def verify(cases: Sequence[str], quick: bool, say: Callable[[str], object] = print) -> int:
+def verify(cases: Sequence[str], quick: bool, log: Callable[[str], object] = print) -> int:
     """Run the cases (files or shipped names; none: all shipped ones) and say a line for each expectation.
 
     With ``quick`` each expectation is held against the quick form of its case; those whose quick forms are
@@ -38,11 +38,11 @@ def verify(cases: Sequence[str], quick: bool, say: Callable[[str], object] = pri
     met = total = 0
     for one in planned:
         began = clock.monotonic()
-        for name, passed, told in _outcome(one):
+        for name, passed, message in _outcome(one):
             met, total = met + passed, total + 1
             verdict, title = "ok  " if passed else "FAIL", f"{one.label} {name}"
-            say(f"{verdict}  {title:{width}}  {told}  {clock.monotonic() - began:.1f} s")
-    say(f"{met} of {total} expected numbers found")
+            log(f"{verdict}  {title:{width}}  {message}  {clock.monotonic() - began:.1f} s")
+    log(f"{met} of {total} expected numbers found")
     return 0 if met == total else 1
 
 

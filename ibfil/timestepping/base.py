@@ -16,16 +16,16 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..errors import StepFailed
-from ..fluids.base import Answer, Fluid, Response
-from ..linalg.constraints import Held
-from ..rods.geometry import Geometry
+from ..fluids.base import Fluid, Response, Solution
+from ..linalg.constraints import Prescribed
+from ..rods.geometry import Configuration
 
 
 class State(NamedTuple):
     """Where the rods are, and the step that led there (y_old (n, m) and dt_old; dt_old = 0 before the first)."""
 
     time: float
-    shape: Geometry
+    configuration: Configuration
     y_old: np.ndarray
     dt_old: float
 
@@ -44,31 +44,33 @@ class Step(NamedTuple):
     response: Response
 
 
-class Rods(Protocol):
-    """What a stepper asks of the rods."""
+class System(Protocol):
+    """What a stepper asks of the system."""
 
     length: float
 
-    def move(self, start: Geometry, y: np.ndarray) -> Geometry:
+    def move(self, start: Configuration, y: np.ndarray) -> Configuration:
         """The configuration displaced by y from ``start``."""
 
-    def turned(self, start: Geometry, y: np.ndarray) -> np.ndarray:
+    def turned(self, start: Configuration, y: np.ndarray) -> np.ndarray:
         """Displacements that turn every segment as y does and do not stretch it."""
 
-    def forces(self, shape: Geometry, time: float) -> tuple[np.ndarray, Any]:
+    def forces(self, configuration: Configuration, time: float) -> tuple[np.ndarray, Any]:
         """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""
 
-    def stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float) -> np.ndarray:
+    def stiffness(self, configuration: Configuration, start: Configuration, moment: Any, time: float) -> np.ndarray:
         """The Jacobian of the forces with respect to y, a band matrix by node."""
 
-    def definite_stiffness(self, shape: Geometry, start: Geometry, moment: Any, time: float) -> np.ndarray:
+    def definite_stiffness(
+        self, configuration: Configuration, start: Configuration, moment: Any, time: float
+    ) -> np.ndarray:
         """The same without compressive geometric stiffness, the part that may make it indefinite."""
 
-    def held(self, before: float, after: float) -> Held:
+    def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""
 
 
-Stiffness = Callable[[Geometry, Geometry, Any, float], np.ndarray]  # one of the two of the rods
+Stiffness = Callable[[Configuration, Configuration, Any, float], np.ndarray]  # one of the two of the rods
 
 
 class NotConverged(StepFailed):
@@ -85,12 +87,12 @@ class Stepper(Protocol):
     def order(self) -> int:
         """Order of accuracy in time."""
 
-    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+    def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """From ``state`` to ``state.time + dt``. Raises NotConverged."""
 
 
 def _finish(
-    rods: Rods, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Answer, count: int, response
+    system: System, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Solution, count: int, response
 ) -> Step:
-    new = State(state.time + dt, rods.move(state.shape, y), y, dt)
+    new = State(state.time + dt, system.move(state.configuration, y), y, dt)
     return Step(new, velocity, answer.force, answer.reaction, count, response)

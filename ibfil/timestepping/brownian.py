@@ -26,10 +26,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..fluids.base import Fluid
-from ..linalg.constraints import Held
-from ..rods.geometry import Geometry
+from ..linalg.constraints import Prescribed
+from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
-from .base import Rods, State, Step
+from .base import State, Step, System
 
 if TYPE_CHECKING:
     from ..fluids.resistive_force import Drag
@@ -70,16 +70,16 @@ class Noise:
         self._kicked = kicked
         self._drift = ((1 if planar else 2) * energy * (1 - drag.par / drag.perp) * own_weight(mesh))[:, None]
 
-    def force(self, shape: Geometry, dt: float) -> np.ndarray:
-        """The mean force (n, m) of the next kicks, over a step ``dt`` from ``shape``, Ito's drift included."""
+    def force(self, configuration: Configuration, dt: float) -> np.ndarray:
+        """The mean force (n, m) of the next kicks, over a step ``dt`` from ``configuration``, Ito's drift included."""
         normal = self._random.standard_normal(self._kicked.shape)
         out = np.empty_like(normal)
-        along = np.sum(normal[:, :3] * shape.e3, axis=1)[:, None] * shape.e3
+        along = np.sum(normal[:, :3] * configuration.e3, axis=1)[:, None] * configuration.e3
         out[:, :3] = self._across * normal[:, :3] + (self._along - self._across) * along
         if out.shape[1] == 4:
             out[:, 3] = self._spin * normal[:, 3]
         out /= np.sqrt(dt)
-        out[:, :3] += self._drift / shape.speed[:, None] * shape.e3
+        out[:, :3] += self._drift / configuration.metric[:, None] * configuration.e3
         return out * self._kicked
 
     def state(self) -> str:
@@ -103,19 +103,19 @@ class Trapezoid:
     noise: Noise
     order: int = 1
 
-    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+    def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """One force, one stiffness, one linear solve.
 
         The force of the step is what the rods do to the fluid: f + K y/2 and reactions, the fluid's kicks not in it.
         """
         middle = state.time + 0.5 * dt
-        force, inner = rods.forces(state.shape, middle)
-        matrix = rods.stiffness(state.shape, state.shape, inner, middle)
-        kicks = self.noise.force(state.shape, dt)
-        index, value = rods.held(state.time, state.time + dt)
+        force, inner = system.forces(state.configuration, middle)
+        matrix = system.stiffness(state.configuration, state.configuration, inner, middle)
+        kicks = self.noise.force(state.configuration, dt)
+        index, value = system.held(state.time, state.time + dt)
         zero = np.zeros_like(force)
-        response = fluid.response(state.shape.r, state.shape.e3, middle, 0.5 * dt)
-        half = response.implicit(force + kicks, matrix, Held(index, 0.5 * value), zero, zero)
+        response = fluid.response(state.configuration.r, state.configuration.e3, middle, 0.5 * dt)
+        half = response.implicit(force + kicks, matrix, Prescribed(index, 0.5 * value), zero, zero)
         y = 2 * half.move
-        new = State(state.time + dt, rods.move(state.shape, y), y, dt)
+        new = State(state.time + dt, system.move(state.configuration, y), y, dt)
         return Step(new, y / dt, half.force - kicks, half.reaction, 1, response)

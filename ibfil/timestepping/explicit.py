@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fluids.base import Fluid
-from .base import Rods, State, Step, _finish
+from .base import State, Step, System, _finish
 
 
 @dataclass(frozen=True)
@@ -16,10 +16,10 @@ class Explicit:
 
     order: int = 1
 
-    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+    def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """One evaluation of the force, one answer of the fluid."""
-        force, _ = rods.forces(state.shape, state.time)
+        force, _ = system.forces(state.configuration, state.time)
         target = np.zeros(force.shape)
-        response = fluid.response(state.shape.r, state.shape.e3, state.time, dt)
-        answer = response.forced(force, rods.held(state.time, state.time + dt), target)
-        return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 0, response)
+        response = fluid.response(state.configuration.r, state.configuration.e3, state.time, dt)
+        answer = response.forced(force, system.held(state.time, state.time + dt), target)
+        return _finish(system, state, dt, answer.move, answer.move / dt, answer, 0, response)

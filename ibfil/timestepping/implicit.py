@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..fluids.base import Answer, Fluid, Response
-from ..linalg.constraints import Held
-from ..rods.geometry import Geometry
-from .base import FAILURES, NotConverged, Rods, State, Step, Stiffness, _finish
+from ..fluids.base import Fluid, Response, Solution
+from ..linalg.constraints import Prescribed
+from ..rods.geometry import Configuration
+from .base import FAILURES, NotConverged, State, Step, Stiffness, System, _finish
 
 
 @njit(cache=True)
@@ -29,26 +29,26 @@ def _size(move, length):
 class _Equation(NamedTuple):
     """What a step has to solve: y = target + tau (u0 + M (f(y) + R)), displacements y from ``start``."""
 
-    rods: Rods
+    system: System
     response: Response
-    start: Geometry
+    start: Configuration
     time: float
     target: np.ndarray  # (n, m)
-    held: Held
+    held: Prescribed
 
-    def correction(self, y: np.ndarray, shape: Geometry, stiffness: Stiffness) -> tuple[Answer, float]:
-        """Newton's correction of y, with the exact or the definite ``stiffness`` of the rods, and its size."""
-        force, inner = self.rods.forces(shape, self.time)
-        matrix = stiffness(shape, self.start, inner, self.time)
+    def correction(self, y: np.ndarray, configuration: Configuration, stiffness: Stiffness) -> tuple[Solution, float]:
+        """Newton's correction of y, with the exact or the definite ``stiffness`` of the system, and its size."""
+        force, inner = self.system.forces(configuration, self.time)
+        matrix = stiffness(configuration, self.start, inner, self.time)
         answer = self.response.implicit(force, matrix, self.held, y, self.target)
-        return answer, _size(answer.move, self.rods.length)
+        return answer, _size(answer.move, self.system.length)
 
 
-def _stride(move: np.ndarray, shape: Geometry) -> float:
+def _stride(move: np.ndarray, configuration: Configuration) -> float:
     """The largest change of a segment, relative to its length."""
-    joined = shape.gap[:-1].any(axis=1)
+    joined = configuration.edge[:-1].any(axis=1)
     change = np.linalg.norm(np.diff(move[:, :3], axis=0), axis=1)
-    return float(np.max(change[joined] / shape.length[:-1][joined]))
+    return float(np.max(change[joined] / configuration.length[:-1][joined]))
 
 
 @dataclass(frozen=True)
@@ -73,29 +73,29 @@ class Implicit:
     stride: float = 0.1  # of a segment
     again: tuple[float, float] = (0.3, 0.08)  # a first correction of the displacement, others of the one before
 
-    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+    def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """Newton to ``tolerance``. Raises one of FAILURES, NotConverged after ``most`` iterations among them."""
         w = dt / state.dt_old if self.order == 2 and state.dt_old > 0 else 0.0
         tau, target = dt * (1 + w) / (1 + 2 * w), (w * w / (1 + 2 * w)) * state.y_old
         after, ahead = state.time + dt, w * state.y_old
-        there = rods.move(state.shape, ahead) if w else state.shape
+        there = system.move(state.configuration, ahead) if w else state.configuration
         equation = _Equation(
-            rods,
+            system,
             fluid.response(there.r, there.e3, after, tau, w),
-            state.shape,
+            state.configuration,
             after,
             target,
-            rods.held(state.time, after),
+            system.held(state.time, after),
         )
         y, answer, count = self._solve(equation, ahead, there)
-        return _finish(rods, state, dt, y, (y - target) / tau, answer, count, equation.response)
+        return _finish(system, state, dt, y, (y - target) / tau, answer, count, equation.response)
 
-    def _solve(self, equation: _Equation, ahead: np.ndarray, there: Geometry) -> tuple[np.ndarray, Answer, int]:
+    def _solve(self, equation: _Equation, ahead: np.ndarray, there: Configuration) -> tuple[np.ndarray, Solution, int]:
         """Newton from wherever it converges; ``ahead`` are the extrapolated displacements, to ``there``."""
         if ahead.any():
             try:
-                y = equation.rods.turned(equation.start, ahead)
-                return self._quickly(equation, y, equation.rods.move(equation.start, y))
+                y = equation.system.turned(equation.start, ahead)
+                return self._quickly(equation, y, equation.system.move(equation.start, y))
             except FAILURES:
                 pass
         try:
@@ -103,20 +103,22 @@ class Implicit:
         except FAILURES:
             return self._newton(equation, ahead, there, self.stride)
 
-    def _quickly(self, equation: _Equation, y: np.ndarray, shape: Geometry) -> tuple[np.ndarray, Answer, int]:
-        """From y, where the rods have ``shape``, to the solution, while corrections shrink, exact ones to a quarter.
+    def _quickly(
+        self, equation: _Equation, y: np.ndarray, configuration: Configuration
+    ) -> tuple[np.ndarray, Solution, int]:
+        """From y, at ``configuration``, to the solution, while corrections shrink, exact ones to a quarter.
 
         Where they shrink more slowly another solution may be on the way, as where a soft rod kinks.
         """
-        rods, last, rate, exact, fresh = equation.rods, _size(y, equation.rods.length), np.inf, 0, False
+        system, last, rate, exact, fresh = equation.system, _size(y, equation.system.length), np.inf, 0, False
         for count in range(1, self.most + 1):
-            force, inner = rods.forces(shape, equation.time)
+            force, inner = system.forces(configuration, equation.time)
             before, fresh = fresh, rate > self.again[count > 2] or not equation.response.keeps
             if fresh:
-                matrix = rods.stiffness(shape, equation.start, inner, equation.time)
+                matrix = system.stiffness(configuration, equation.start, inner, equation.time)
                 exact += 1
             answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
-            size = _size(answer.move, rods.length)
+            size = _size(answer.move, system.length)
             rate = size / max(last, self.tolerance)
             if not rate < (0.25 if fresh and before else 1.0):
                 break
@@ -127,30 +129,32 @@ class Implicit:
             coming = size * known if count > 1 else size
             if coming < self.tolerance:
                 return y, answer, count
-            shape, last = rods.move(equation.start, y), size
+            configuration, last = system.move(equation.start, y), size
         raise NotConverged(f"corrections do not shrink after {count} iterations", 0)
 
     def _newton(
-        self, equation: _Equation, y: np.ndarray, shape: Geometry, stride: float | None
-    ) -> tuple[np.ndarray, Answer, int]:
-        """From y, where the rods have ``shape``, to the solution: its y, the last answer, the iterations it took.
+        self, equation: _Equation, y: np.ndarray, configuration: Configuration, stride: float | None
+    ) -> tuple[np.ndarray, Solution, int]:
+        """From y, at ``configuration``, to the solution: its y, the last answer, the iterations it took.
 
         ``stride``: the largest change of a segment by a correction; None: corrections are whole.
         """
-        rods, exact, last = equation.rods, False, np.inf
+        system, exact, last = equation.system, False, np.inf
         for count in range(1, self.most + 1):
-            answer, size = equation.correction(y, shape, rods.stiffness if exact else rods.definite_stiffness)
+            answer, size = equation.correction(
+                y, configuration, system.stiffness if exact else system.definite_stiffness
+            )
             if exact and not size <= 4 * last:
-                answer, size = equation.correction(y, shape, rods.definite_stiffness)
+                answer, size = equation.correction(y, configuration, system.definite_stiffness)
             if not np.isfinite(size):
                 break
-            part = 1.0 if stride is None else min(1.0, stride / max(_stride(answer.move, shape), 1e-300))
+            part = 1.0 if stride is None else min(1.0, stride / max(_stride(answer.move, configuration), 1e-300))
             y = y + part * answer.move
             # Newton squares the error, so two exact corrections in a row tell the size of the next.
             coming = size * (size / last) ** 2 if exact and count > 2 else size
             if part == 1.0 and coming < self.tolerance:
                 return y, answer, count
-            shape, exact, last = rods.move(equation.start, y), True, size
+            configuration, exact, last = system.move(equation.start, y), True, size
         worst = int(np.argmax(np.max(np.abs(answer.move), axis=1)))
         still = f"Newton's correction is still {size:.2g} of the length (allowed {self.tolerance:g})"
         if not np.isfinite(size):

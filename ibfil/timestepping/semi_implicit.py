@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fluids.base import Fluid
-from .base import Rods, State, Step, _finish
+from .base import State, Step, System, _finish
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,12 @@ class SemiImplicit:
 
     order: int = 1
 
-    def step(self, rods: Rods, fluid: Fluid, state: State, dt: float) -> Step:
+    def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """One force, one stiffness, one linear solve."""
         after = state.time + dt
-        force, inner = rods.forces(state.shape, after)
-        matrix = rods.definite_stiffness(state.shape, state.shape, inner, after)
+        force, inner = system.forces(state.configuration, after)
+        matrix = system.definite_stiffness(state.configuration, state.configuration, inner, after)
         zero = np.zeros(force.shape)
-        response = fluid.response(state.shape.r, state.shape.e3, after, dt)
-        answer = response.implicit(force, matrix, rods.held(state.time, after), zero, zero)
-        return _finish(rods, state, dt, answer.move, answer.move / dt, answer, 1, response)
+        response = fluid.response(state.configuration.r, state.configuration.e3, after, dt)
+        answer = response.implicit(force, matrix, system.held(state.time, after), zero, zero)
+        return _finish(system, state, dt, answer.move, answer.move / dt, answer, 1, response)

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..fluids.base import Fluid
 from ..linalg import banded
-from ..linalg.constraints import Held
-from ..rods.geometry import Geometry
-from ..rods.system import Mechanics
+from ..linalg.constraints import Prescribed
+from ..rods.geometry import Configuration
+from ..rods.system import RodSystem
 
 if TYPE_CHECKING:
     pass
@@ -20,22 +20,24 @@ if TYPE_CHECKING:
 _SETTLED = 0.01  # of the explicit limit, where it depends on the step itself
 
 
-def explicit_limit(rods: Mechanics, fluid: Fluid, shape: Geometry, time: float, iterations: int = 1000) -> float:
+def explicit_limit(
+    system: RodSystem, fluid: Fluid, configuration: Configuration, time: float, iterations: int = 1000
+) -> float:
     """2/rho(M K): the largest stable step of forward Euler at this configuration, by power iteration.
 
     K is the exact Jacobian, M the fluid's. Stops when an iteration changes the estimate by 1e-5: with the stiffest
     modes close together, some hundreds of iterations, it is then within 1 %. A fluid with inertia moves the more the
     longer the step is, up to Stokes flow: then it is the step dt with dt = 2/rho(M(dt) K), which errs on the safe side.
     """
-    force, inner = rods.forces(shape, time)
-    matrix = rods.stiffness(shape, shape, inner, time)
-    held = Held(rods.ends.index, np.zeros(rods.ends.index.size))
+    force, inner = system.forces(configuration, time)
+    matrix = system.stiffness(configuration, configuration, inner, time)
+    held = Prescribed(system.ends.index, np.zeros(system.ends.index.size))
     zero = np.zeros_like(force)
     x = np.random.default_rng(0).standard_normal(force.shape)
     x.ravel()[held.at] = 0.0
     dt, last = 1.0, 0.0
     while True:
-        response = fluid.response(shape.r, shape.e3, time, dt)
+        response = fluid.response(configuration.r, configuration.e3, time, dt)
         rest = response.forced(zero, held, zero).move
 
         def moved(x: np.ndarray, response=response, rest=rest, dt=dt) -> np.ndarray:

@@ -153,7 +153,7 @@ class AdaptiveStep:
 
     A step whose error is above tolerance times dt is rejected, the whole of it, and repeated shorter. Steps are held:
     equal parts of the time to the next output, until one HELD times as long would do (codes for stiff equations do so:
-    VODE, Brown, Byrne & Hindmarsh 1989). A fluid with inertia has its operator made anew for each new length, and what
+    VODE, Brown, Byrne & Hindmarsh 1989). A fluid with inertia has its operator made again for each new length, and what
     is known of equal steps' error holds best for more of them. A step grows by two at the most (BDF2 is stable below
     2.41). Three rejections in a row, as at a jump in what drives the rods, start again from an Euler step.
     """

@@ -1,7 +1,7 @@
 """One figure for a run: `ibfil show RUN.h5 --plot FILE.png`.
 
 Shapes over time in the plane of largest motion, the path of the centroids, the flow in that plane where a
-velocity field was put out, and the observables, speed, elastic energy, power and stretch against time. Drawn by
+velocity field was written, and the observables, speed, elastic energy, power and stretch against time. Drawn by
 matplotlib without a display.
 """
 
@@ -135,7 +135,7 @@ def _paths(axes: Axes, run: RunFile, positions: Sequence[np.ndarray], plane: tup
 
 
 def _flow(fig: Figure, axes: Axes, run: RunFile, positions: Sequence[np.ndarray], plane: tuple[int, int]) -> None:
-    """The grid plane nearest the filaments, around them, at the last time a field was put out.
+    """The grid plane nearest the filaments, around them, at the last time a field was written.
 
     Colour is the speed, all three components; arrows have the direction in the plane, and no length: the
     speed falls too fast from the filament for both to be seen.

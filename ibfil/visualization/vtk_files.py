@@ -47,7 +47,7 @@ def write_vtk(
 
     ``wrap`` brings filaments into the periodic box, cut at its faces; ``images`` adds their periodic images in so many
     boxes on each side. With ``watch`` it goes on, looking every so many seconds, until the run is no longer running. A
-    time at which only filaments or only fields were put out shows the last of the other before it, which is what
+    time at which only filaments or only fields were written shows the last of the other before it, which is what
     ParaView itself does with two sources. Raises what `ibfil.open` raises for a file that is no run, CaseError where
     wrapping or images are asked of a run without a box, OSError where a file cannot be written.
     """
@@ -99,13 +99,13 @@ class Collection:
         _keep_common(self.filaments, run.time)
         rods, box = rods_of(run), box_of(run)
         done = len(self.filaments)
-        for i, frame in enumerate(run.frames(done), done):
+        for i, frame in enumerate(run.snapshots(done), done):
             file = f"{self.run.stem}_filaments_{i:06d}.vtp"
             _save(polylines(frame, rods, box, self.view), self.folder / file)
             self.filaments.append((frame.time, file))
 
     def _add_fields(self, run: RunFile) -> None:
-        """A .vti for each time at which fields were put out."""
+        """A .vti for each time at which fields were written."""
         times = np.empty(0) if run.grid is None else np.asarray(run.grid.time)
         _keep_common(self.fields, times)
         for i in range(len(self.fields), len(times)):
@@ -115,7 +115,7 @@ class Collection:
 
 
 def _keep_common(entries: Entries, times: np.ndarray) -> None:
-    """Forget what a run that was cut back to its checkpoint put out at other times since."""
+    """Forget what a run that was cut back to its checkpoint written at other times since."""
     same = [time == now for (time, _), now in zip(entries, times, strict=False)]
     del entries[same.index(False) if False in same else len(same) :]
 

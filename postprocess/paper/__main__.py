@@ -83,10 +83,10 @@ def _write(rows: list[Row], seconds: float, quick: bool, folder: Path) -> None:
         writer = csv.writer(out)
         writer.writerow(HEADINGS)
         writer.writerows(columns(row) for row in rows)
-    told = ", ".join(f"{name} {version}" for name, version in versions().items())
+    message = ", ".join(f"{name} {version}" for name, version in versions().items())
     load = f"load average {os.getloadavg()[2]:.0f} on {os.cpu_count()} cores" if hasattr(os, "getloadavg") else ""
     machine = f"{platform.system()} {platform.machine()}, one thread a run, {load}"
-    head = f"# Section 7 of the paper, {'quick' if quick else 'full'} form\n\n{date.today()}; {told}; {machine}.\n\n"
+    head = f"# Section 7 of the paper, {'quick' if quick else 'full'} form\n\n{date.today()}; {message}; {machine}.\n\n"
     tail = f"\nWall time of all runs: {seconds / 60:.0f} minutes.\n"
     (folder / "table.md").write_text(head + markdown(rows) + tail, encoding="utf-8")
     print(f"\n{folder / 'table.md'}, {folder / 'table.csv'}")

@@ -28,14 +28,14 @@ from ibfil.simulation.simulation import Simulation
 def diffusion_ratio(case: Case, lag: float) -> float:
     """D_perp/D_par of the centroid of the case's only filament over ``lag``, about its gyration axis at rest."""
     simulation = at_rest(case)
-    mechanics, shape = simulation.mechanics, simulation.shape
-    n, m = len(shape.r), mechanics.unknowns
-    moment = mechanics.moment(shape, 0.0)
-    stiffness = dense(mechanics.stiffness(shape, shape, moment, 0.0)).reshape(n * m, n * m)
+    system, shape = simulation.system, simulation.configuration
+    n, m = len(shape.r), system.unknowns
+    moment = system.moment(shape, 0.0)
+    stiffness = dense(system.stiffness(shape, shape, moment, 0.0)).reshape(n * m, n * m)
     root = _inverse_root(simulation.fluid.drag, shape.e3, m)
     scaled = root @ (-0.5 * (stiffness + stiffness.T)) @ root
     rates, modes = np.linalg.eigh(scaled)
-    share = mechanics.mesh.volume / mechanics.mesh.volume.sum()
+    share = system.mesh.volume / system.mesh.volume.sum()
     axes = gyration_axes(shape.r, share)
     squares = [_mean_square(rates, modes, root, _component(share, axis, m), lag) for axis in axes.T]
     return 0.5 * (squares[0] + squares[1]) / squares[2]

@@ -170,7 +170,7 @@ def _onsets(runs: Runs) -> list[Row]:
 
 def _states(runs: Runs) -> list[Row]:
     rows = []
-    for name, told in (("round", "large, past the clamp"), ("ribbon", "finite")):
+    for name, message in (("round", "large, past the clamp"), ("ribbon", "finite")):
         run = runs[f"fig8-large-{name}"]
         tip, amplitude = run.position()[-1, -1], _amplitude(run)
         late, before = (_last(run, amplitude, k) for k in (0, 1))
@@ -179,7 +179,7 @@ def _states(runs: Runs) -> list[Row]:
         state = f"{late.mean():.4f}"
         where = f"tip's distance from the axis, {name}, spin {_spin(run):.3g}"
         behind = f"{steady} at t = {run.time[-1]:.4g}; the free end is at x = {tip[0]:.3f} L"
-        rows.append(Row("7.6", where, told, None, state, run.wall_time, note=behind))
+        rows.append(Row("7.6", where, message, None, state, run.wall_time, note=behind))
     for name, words in (("up", "jump to the large whirl, spin slowly raised"), ("down", "fall from it, lowered")):
         whole = f"fig8-sweep-round-{name}"
         if whole in set(runs):

@@ -140,13 +140,13 @@ def _branches(runs: Runs) -> list[Row]:
         run = runs[name]
         value, force = _planarity(run), run.case.parameters["F0"]
         state = "rotates" if value > 0.5 else "planar" if value < 0.05 else "neither yet"
-        told = "rotation possible" if 40 <= force <= 100 else ""
-        rows.append(Row("7.7", f"with a small twist at F0 = {force:g}", told, None, state, run.wall_time))
+        message = "rotation possible" if 40 <= force <= 100 else ""
+        rows.append(Row("7.7", f"with a small twist at F0 = {force:g}", message, None, state, run.wall_time))
     if "fig9-ramp" in set(runs):
         force, width = _ramp(runs["fig9-ramp"])
         lost = next((f"{f:.0f}" for f, w in zip(force, width, strict=True) if f > 61 and w < 0.5), "above 120")
-        told = Row("7.7", "rotation is left, F0 slowly raised, at", "100", None, lost, runs["fig9-ramp"].wall_time)
-        rows.append(told)
+        message = Row("7.7", "rotation is left, F0 slowly raised, at", "100", None, lost, runs["fig9-ramp"].wall_time)
+        rows.append(message)
     return rows
 
 

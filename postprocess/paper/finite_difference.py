@@ -22,8 +22,8 @@ from .old_schemes import (
     add_drag,
     derivative,
     drag_times,
-    frame,
     put_rows,
+    snapshot,
     stencils,
     tension,
 )
@@ -49,7 +49,7 @@ def swim(swimmer: Swimmer, step: float, end: float, every: float) -> tuple[np.nd
     stride = round(every / step)
     for k in range(round(end / step)):
         r1 = derivative(*l1, r)
-        e3, e2 = frame(r1)
+        e3, e2 = snapshot(r1)
         preferred = swimmer.curvature(k * step)
         pushed = preferred[:, None] * e2
         bent = -np.sum(e2 * derivative(*l2, r), axis=1)

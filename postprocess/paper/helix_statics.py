@@ -27,7 +27,7 @@ class Helix:
     perp: float
     par: float
 
-    def frame(self) -> np.ndarray:
+    def snapshot(self) -> np.ndarray:
         """Directors (columns) at the clamp, for an axis along x: kappa e1 + tau e3 is along it."""
         size = np.hypot(self.kappa, self.tau)
         axis, _, up = np.eye(3)
@@ -49,7 +49,7 @@ class Helix:
 
     def extensions(self, speeds: Sequence[float]) -> list[float]:
         """How far the tip has gone along x in flows of these speeds, which grow from zero. Raises RuntimeError."""
-        clamp = np.concatenate([np.zeros(3), *self.frame().T])
+        clamp = np.concatenate([np.zeros(3), *self.snapshot().T])
         start = np.concatenate([clamp, np.zeros(6)])
         s = np.linspace(0.0, self.length, 201)
         free = solve_ivp(lambda x, y: self.derivative(y[:, None], 0.0)[:, 0], (0, self.length), start, "DOP853", s)

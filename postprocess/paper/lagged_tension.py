@@ -20,7 +20,7 @@ from .old_schemes import (
     add_segments,
     derivative,
     drag_times,
-    frame,
+    snapshot,
     stencils,
     tension,
 )
@@ -44,7 +44,7 @@ def swim(swimmer: Swimmer, step: float, steps: int) -> tuple[np.ndarray, bool]:
     where = Profile(np.maximum(rows - REACH, 0), np.minimum(rows + REACH, n - 1), REACH)
     r = swimmer.start()
     for k in range(steps):
-        e3, e2 = frame(derivative(*l1, r))
+        e3, e2 = snapshot(derivative(*l1, r))
         preferred = swimmer.curvature(k * step)
         preferred[[0, -1]] = 0.0  # no moment at the ends
         bent = -np.sum(e2 * derivative(*l2, r), axis=1)

@@ -126,7 +126,7 @@ def add_segments(matrix, stiff, axial, gap, scale):
                 matrix[i + 1, a, 3 * (w - 1) + b] -= scale[i + 1] * k
 
 
-def frame(r1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def snapshot(r1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """e3 and e2 = e3 x z (n, 3) from r'."""
     e3 = r1 / np.linalg.norm(r1, axis=1)[:, None]
     return e3, np.column_stack([e3[:, 1], -e3[:, 0], np.zeros(len(e3))])

@@ -10,7 +10,7 @@ import pytest
 from helpers.scenes import RFT, STOKES, run, scene, slopes
 from scipy.optimize import brentq
 
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation.simulation import Simulation
 
 PERP, PAR = 4 * np.pi, 2 * np.pi
@@ -22,16 +22,16 @@ FLUIDS = pytest.mark.parametrize("fluid", [RFT, STOKES], ids=["rft", "stokes"])
 def test_a_free_rod_is_carried_by_a_uniform_flow_and_feels_no_force(fluid: Mapping[str, Any]) -> None:
     """Exactly: BDF2 after one Euler step is exact for a velocity that is constant in time."""
     simulation = run(scene({"rod": ROD}, {**fluid, "flow": [0.3, -0.2, 0.1]}, end=0.5, step=0.1))
-    moved = simulation.shape.r - simulation.start.r
+    moved = simulation.configuration.r - simulation.start.r
     assert moved == pytest.approx(np.tile([0.15, -0.1, 0.05], (13, 1)), abs=1e-9)
-    assert np.abs(simulation.frame().filaments["rod"].force).max() < 1e-6
+    assert np.abs(simulation.snapshot().filaments["rod"].force).max() < 1e-6
 
 
 def test_a_uniform_flow_carries_a_rod_that_straightens_and_changes_nothing_else() -> None:
     rod = {**ROD, "shape": {"kind": "circle", "curvature": 2.0}}
     still, carried = (run(scene({"rod": rod}, {**RFT, "flow": u}, end=0.5, step=0.1)) for u in ([0, 0, 0], [0.3, 1, 0]))
-    assert np.abs(still.shape.bend).max() < 1.9
-    assert carried.shape.r - still.shape.r == pytest.approx(np.tile([0.15, 0.5, 0], (13, 1)), abs=1e-9)
+    assert np.abs(still.configuration.bend).max() < 1.9
+    assert carried.configuration.r - still.configuration.r == pytest.approx(np.tile([0.15, 0.5, 0], (13, 1)), abs=1e-9)
 
 
 @FLUIDS
@@ -44,7 +44,7 @@ def test_a_flow_that_changes_in_time_carries_a_rod_by_its_integral(fluid: Mappin
     for step in (0.04, 0.02, 0.01):
         flow = ["5*t**2*cos(3*t)", 0, "t**2"]
         simulation = run(scene({"rod": ROD}, {**fluid, "flow": flow}, end=0.4, step=step))
-        r, velocity = simulation.shape.r.mean(axis=0), simulation.frame().filaments["rod"].velocity
+        r, velocity = simulation.configuration.r.mean(axis=0), simulation.snapshot().filaments["rod"].velocity
         assert velocity == pytest.approx(np.tile([5 * 0.16 * np.cos(1.2), 0, 0.16], (13, 1)), abs=1e-9)
         exact = 5 * ((9 * 0.16 - 2) * np.sin(1.2) + 6 * 0.4 * np.cos(1.2)) / 27
         errors.append(float(np.abs(r - [exact, 0, 0.064 / 3]).max()))
@@ -56,7 +56,7 @@ def turned(fluid: Mapping[str, Any], start: float, end: float, step: float) -> f
     """How far a stiff straight rod at an angle to the flow u = (y, 0, 0) is from cot(angle) = cot(start) + t."""
     direction = [np.cos(start), np.sin(start), 0.0]
     rod = {**ROD, "bending": 1e3, "stretching": 1e6, "direction": direction}
-    r = run(scene({"rod": rod}, {**fluid, "flow": ["y", 0, 0]}, end=end, step=step)).shape.r
+    r = run(scene({"rod": rod}, {**fluid, "flow": ["y", 0, 0]}, end=end, step=step)).configuration.r
     assert np.abs(r.mean(axis=0)).max() < 1e-12
     chord = r[-1] - r[0]
     assert abs(chord[2]) < 1e-12
@@ -90,14 +90,14 @@ def rates(mu: float, nodes: int) -> np.ndarray:
     rod = {**ROD, "nodes": nodes, "stretching": 1e6}
     flow = {**RFT, "flow": [f"-{gamma!r}*x", f"{gamma!r}*y", 0]}
     simulation = run(scene({"rod": rod}, flow, end=100 / gamma, step=2 / gamma, order=1))
-    mechanics, shape = simulation.mechanics, simulation.shape
-    assert np.abs(simulation.frame().filaments["rod"].velocity).max() < 1e-10
+    system, shape = simulation.system, simulation.configuration
+    assert np.abs(simulation.snapshot().filaments["rod"].velocity).max() < 1e-10
 
     def across(y: np.ndarray) -> np.ndarray:
-        moved = mechanics.start(shape.r + np.outer(y, [0, 1, 0]), shape.e1)
-        force, _ = mechanics.forces(moved, 0.0)
+        moved = system.start(shape.r + np.outer(y, [0, 1, 0]), shape.e1)
+        force, _ = system.forces(moved, 0.0)
         response = simulation.fluid.response(moved.r, moved.e3, 0.0, 1.0)
-        return response.forced(force, Held(np.zeros(0, np.int64), np.zeros(0)), np.zeros_like(force)).move[:, 1]
+        return response.forced(force, Prescribed(np.zeros(0, np.int64), np.zeros(0)), np.zeros_like(force)).move[:, 1]
 
     h = 1e-9  # the stretch it makes is of second order, but EA is large
     jacobian = np.array([across(h * unit) - across(-h * unit) for unit in np.eye(nodes)]).T / (2 * h)
@@ -138,7 +138,7 @@ def test_a_held_rod_feels_the_drag_of_the_flow_along_it() -> None:
     """zeta_par U (L - s) beyond s; the support holds it all."""
     rod = {**ROD, "start": {"end": "clamped"}, "anchor": "start"}
     simulation = run(scene({"rod": rod}, {**RFT, "flow": [0.7, 0, 0]}, end=40.0, step=1.0, order=1))
-    found, s = simulation.frame().filaments["rod"], simulation.arclength
+    found, s = simulation.snapshot().filaments["rod"], simulation.arclength
     assert found.tension == pytest.approx(PAR * 0.7 * (1 - 0.5 * (s[1:] + s[:-1])), rel=1e-8)
     assert found.reaction_start == pytest.approx([-PAR * 0.7, 0, 0], abs=1e-8)
 
@@ -147,7 +147,7 @@ def test_the_flow_is_in_the_velocity_field_that_is_written() -> None:
     """A free straight rod in a uniform flow disturbs nothing: the field is the flow, but for round-off in single."""
     fluid = {**STOKES, "flow": ["0.5", "0.1*sin(pi*x)", "0"]}
     simulation = run(scene({"rod": {**ROD, "bending": 1e-8, "stretching": 1e-8}}, fluid, end=0.1, step=0.05))
-    field = simulation.frame(("velocity",)).grid["velocity"]
+    field = simulation.snapshot(("velocity",)).grid["velocity"]
     x = simulation.grid.origin[0] + simulation.grid.spacing * np.arange(32)
     assert field[..., 0] == pytest.approx(np.full((32, 32, 32), 0.5), abs=1e-6)
     assert field[..., 1] == pytest.approx(np.broadcast_to(0.1 * np.sin(np.pi * x)[:, None, None], (32,) * 3), abs=1e-6)
@@ -161,7 +161,7 @@ def test_a_fluid_with_inertia_knows_the_time_of_its_flow_in_steps_of_any_length(
         simulation.advance(until, lambda: None)
     assert simulation.steps == 3
     assert simulation.fluid.time == pytest.approx(0.025, rel=1e-13)
-    assert simulation.fluid.past.dt_old == pytest.approx(0.005, rel=1e-12)
+    assert simulation.fluid.history.dt_old == pytest.approx(0.005, rel=1e-12)
 
 
 def test_a_maintained_flow_has_no_pressure_of_its_own() -> None:
@@ -169,4 +169,4 @@ def test_a_maintained_flow_has_no_pressure_of_its_own() -> None:
     vortices = ["sin(pi*x)*cos(pi*y)", "-cos(pi*x)*sin(pi*y)", "0"]  # alone they have rho/4 (cos 2 pi x + cos 2 pi y)
     fluid = {**STOKES, "model": "navier-stokes", "density": 1.0, "flow": vortices}
     simulation = run(scene({"rod": {**ROD, "bending": 1e-8, "stretching": 1e-8}}, fluid, end=0.04, step=0.01))
-    assert np.abs(simulation.frame(("pressure",)).grid["pressure"]).max() < 1e-6
+    assert np.abs(simulation.snapshot(("pressure",)).grid["pressure"]).max() < 1e-6

@@ -71,14 +71,14 @@ def test_no_random_numbers_without_thermal_forces(monkeypatch):
 
 def test_no_twist_unknowns_without_twisting():
     plain, twisted = Simulation(case()), Simulation(case(*ALL[:2]))
-    assert plain.mechanics.unknowns == 3
+    assert plain.system.unknowns == 3
     assert plain.state()["velocity"].shape == (9, 3)
-    assert twisted.mechanics.unknowns == 4
+    assert twisted.system.unknowns == 4
     assert twisted.state()["velocity"].shape == (9, 4)
 
 
 def test_no_jacobian_in_explicit_runs(monkeypatch):
-    jacobians = Counter(monkeypatch, system.Mechanics, "stiffness")
+    jacobians = Counter(monkeypatch, system.RodSystem, "stiffness")
     explicit = ("time.scheme=explicit", "time.step=1e-5")
     steps = ran(*explicit).steps + ran(*explicit, *GRID).steps
     assert jacobians.calls == 2 < steps / 500  # one a run, to warn of a step that will diverge; none a step

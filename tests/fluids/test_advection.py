@@ -49,7 +49,7 @@ def test_aliases_of_a_field_as_rods_make_it_are_few():
     it = fluid((32, 32, 32), viscosity=1.0)
     response = it.response(FAR, ZERO, 0.0, 1e6)
     it.advance(response, np.array([[30.0, -10.0, 20.0]]))
-    u = np.fft.irfftn(it.past.now * smooth(it), it.immersed.grid.cells, axes=(1, 2, 3)) * 32**3
+    u = np.fft.irfftn(it.history.now * smooth(it), it.immersed.grid.cells, axes=(1, 2, 3)) * 32**3
     expected = smooth(it) * omega_cross_u(it, u)
     wrong, size = np.linalg.norm(advection(it) - expected), np.linalg.norm(expected)
     assert 1e-3 * size < wrong < 0.03 * size
@@ -59,7 +59,7 @@ def test_advection_does_no_work_and_moves_no_mean():
     it = fluid()
     u = waves(it)
     begin(it, u)
-    n = np.fft.irfftn(advection(it), it.immersed.grid.cells, axes=(1, 2, 3)) * it.room.flow.size
+    n = np.fft.irfftn(advection(it), it.immersed.grid.cells, axes=(1, 2, 3)) * it.workspace.flow.size
     assert np.abs(np.sum(u * n)) < 1e-12 * np.sum(np.abs(u * n))
     assert np.abs(n.mean(axis=(1, 2, 3))).max() < 1e-17
     assert it.fastest == pytest.approx(np.abs(u).max(), rel=1e-12)

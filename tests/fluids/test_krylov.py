@@ -10,7 +10,7 @@ from ibfil.errors import CaseError
 from ibfil.fluids import preconditioner
 from ibfil.fluids.condensation import Newton, NothingCondensed, TwistCondensed
 from ibfil.linalg import gmres
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation.simulation import Simulation
 
 MANY = """
@@ -48,7 +48,7 @@ def _simulation(method, count=3, nodes=12, twisting="", start=""):
 
 def _run(simulation):
     simulation.advance(0.06, lambda: None)
-    return simulation.frame()
+    return simulation.snapshot()
 
 
 @pytest.mark.parametrize(("twisting", "start"), [("", ""), (TWIST, ""), (TWIST, CLAMP)])
@@ -69,9 +69,9 @@ def test_krylov_is_the_dense_path_on_three_filaments(twisting, start):
 def test_residual_of_a_step_with_2000_nodes():
     """y = target + tau M F at every node, with the velocity of the FFT operator."""
     simulation = _simulation("krylov", 40, 50)
-    start = simulation.shape.r.copy()
+    start = simulation.configuration.r.copy()
     simulation.advance(0.01, lambda: None)  # one step of Euler, M frozen at the start
-    move = simulation.shape.r - start
+    move = simulation.configuration.r - start
     force = simulation.state()["force"]
     fluid = simulation.fluid
     base, weights = fluid.immersed.stencil(start)
@@ -87,8 +87,8 @@ def test_the_kept_preconditioner_goes_into_the_state_and_comes_back():
     whole.advance(0.03, lambda: None)
     for simulation in (whole, again):
         simulation.advance(0.06, lambda: None)
-    assert np.array_equal(whole.shape.r, again.shape.r)
-    assert np.array_equal(whole.shape.e1, again.shape.e1)
+    assert np.array_equal(whole.configuration.r, again.configuration.r)
+    assert np.array_equal(whole.configuration.e1, again.configuration.e1)
 
 
 def test_memory_of_ten_thousand_nodes_is_told_and_below_two_gibibytes():
@@ -106,18 +106,18 @@ def test_auto_takes_krylov_where_the_table_costs_more():
 
 def test_copies_are_the_same_filament_turned_and_moved():
     simulation = _simulation("table", 4)
-    frame = simulation.frame()
-    one = frame.filaments["rod_000"].position
+    snapshot = simulation.snapshot()
+    one = snapshot.filaments["rod_000"].position
     distances = np.linalg.norm(one[:, None] - one[None], axis=2)
-    for filament in frame.filaments.values():
+    for filament in snapshot.filaments.values():
         r = filament.position
         assert np.allclose(np.linalg.norm(r[:, None] - r[None], axis=2), distances, atol=1e-13)
         middle = r[np.array([5, 6])].mean(axis=0)
         assert np.all(np.abs(middle) < 0.9)
-    turns = [np.linalg.norm(f.position[-1] - f.position[0] - (one[-1] - one[0])) for f in frame.filaments.values()]
+    turns = [np.linalg.norm(f.position[-1] - f.position[0] - (one[-1] - one[0])) for f in snapshot.filaments.values()]
     assert min(turns[1:]) > 0.05  # turned, each its own way
-    again = _simulation("table", 4).frame()
-    assert np.array_equal(again.filaments["rod_003"].position, frame.filaments["rod_003"].position)
+    again = _simulation("table", 4).snapshot()
+    assert np.array_equal(again.filaments["rod_003"].position, snapshot.filaments["rod_003"].position)
 
 
 def test_copies_from_a_file(tmp_path):
@@ -125,7 +125,7 @@ def test_copies_from_a_file(tmp_path):
     text = MANY.format(method="table", count=1, nodes=12, twisting="", start="")
     text = text.replace(text.split("copies = ")[1].split("\n")[0], '{ file = "places.csv" }')
     case = parse_case(text, str(tmp_path / "many.toml"))
-    a, b = (f.position for f in Simulation(case).frame().filaments.values())
+    a, b = (f.position for f in Simulation(case).snapshot().filaments.values())
     assert np.allclose((a - [0.5, 0, 0]) * [-1, -1, 1], b - [-0.5, 0.25, 0], atol=1e-14)  # half a turn about z
     (tmp_path / "places.csv").write_text("1, 2\n")
     with pytest.raises(CaseError, match=r"copies\.file"):
@@ -151,7 +151,7 @@ def test_a_stiff_rod_of_many_nodes_is_not_given_up_for_rounding():
         simulation = Simulation(swimmer(fluid, stretching=50.0, end=0.06, step=0.03, rod={"nodes": 200}))
         simulation.advance(0.06, lambda: None)
         assert simulation.shortened == 0
-        paths[method] = simulation.shape.r
+        paths[method] = simulation.configuration.r
     for method in ("krylov", "fft"):
         assert np.abs(paths[method] - paths["table"]).max() < 1e-8
 
@@ -171,7 +171,7 @@ def test_the_system_of_rods_is_their_statement(unknowns, condensation):
             band[i, :, a * unknowns : (a + 1) * unknowns] = 0.0
     parts = np.array([0, 2, 5 * unknowns + 1, 15 * unknowns + unknowns - 1, 20 * unknowns])
     zero = np.zeros((n, unknowns))
-    statement = condensation.reduced(Newton(zero, band, Held(parts, np.zeros(5)), zero, zero, tau))
+    statement = condensation.reduced(Newton(zero, band, Prescribed(parts, np.zeros(5)), zero, zero, tau))
     c = statement.force.size // n
     for rod in (slice(0, n), *rods):
         within = slice(c * rod.start, c * rod.stop)

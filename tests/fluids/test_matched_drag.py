@@ -202,8 +202,8 @@ def test_the_drag_of_a_case_is_that_of_a_straight_rod_with_its_spacing_in_its_gr
     stacked = assembly_rods.rods(case(viscosity=3.0))
     drag = assembly_drag.drag(case(viscosity=3.0), stacked)
     expected = measure(SMALL)
-    assert drag.perp == pytest.approx(3.0 * expected.perp * stacked.mechanics.mesh.volume, rel=1e-12)
-    assert drag.par == pytest.approx(3.0 * expected.par * stacked.mechanics.mesh.volume, rel=1e-12)
+    assert drag.perp == pytest.approx(3.0 * expected.perp * stacked.system.mesh.volume, rel=1e-12)
+    assert drag.par == pytest.approx(3.0 * expected.par * stacked.system.mesh.volume, rel=1e-12)
 
 
 def test_each_filament_has_its_own():
@@ -226,7 +226,7 @@ def test_spin_is_against_the_rods_own_drag():
     twisting = {**ROD, "twisting": 1.0, "radius": 0.02}
     made = case(rods={"rod": twisting}, viscosity=2.0)
     stacked = assembly_rods.rods(made)
-    expected = 4 * np.pi * 2.0 * 0.02**2 * stacked.mechanics.mesh.volume
+    expected = 4 * np.pi * 2.0 * 0.02**2 * stacked.system.mesh.volume
     assert assembly_drag.drag(made, stacked).spin == pytest.approx(expected, rel=1e-12)
 
 

@@ -11,7 +11,7 @@ from ibfil.fluids.coupling import Nodes
 from ibfil.fluids.fields import GridFields
 from ibfil.fluids.immersed_boundary import Immersed
 from ibfil.fluids.inertial_fields import InertialFields
-from ibfil.fluids.navier_stokes import NavierStokes, Room
+from ibfil.fluids.navier_stokes import NavierStokes, Workspace
 from ibfil.fluids.stokes import StokesByTable
 from ibfil.fluids.torque_coupling import TorqueCoupling, TorqueStokesSolve
 from ibfil.grid.kernels import KERNELS
@@ -63,7 +63,7 @@ def test_vortices_drift_with_a_uniform_flow(order):
         it = fluid(viscosity=0.05, flow=flow)
         x, y, _ = places(it)
         begin(it, vortices(x, y))
-        it.past.dt_old, dt = 0.0, 1.0 / steps
+        it.history.dt_old, dt = 0.0, 1.0 / steps
         for k in range(steps):
             coast(it, dt, 1.0 if order == 2 and k > 0 else 0.0)
         errors.append(np.abs(velocity(it) - np.exp(-0.1) * vortices(x - 0.7, y + 0.4)).max())
@@ -75,7 +75,7 @@ def test_waves_that_disturb_each_other_converge_at_second_order_by_any_steps():
     def end(steps: int, uneven: bool) -> np.ndarray:
         it = fluid(viscosity=0.02)
         begin(it, waves(it))
-        it.past.dt_old, old = 0.0, 0.0
+        it.history.dt_old, old = 0.0, 0.0
         for k in range(steps):
             dt = (1.0 + (0.4 * (-1) ** k if uneven else 0.0)) / steps
             coast(it, dt, dt / old if old else 0.0)
@@ -126,7 +126,7 @@ def test_a_net_force_is_carried_by_the_back_pressure_and_the_fluid_gains_no_mome
         response = it.response(FAR, ZERO, 0.0, 0.1, float(k > 0))
         it.advance(response, response.forced(np.array([[1.0, 2.0, -3.0]]), NOTHING, ZERO).force)
     assert np.abs(velocity(it)).max() > 0.01
-    assert not it.past.now[:, 0, 0, 0].any()
+    assert not it.history.now[:, 0, 0, 0].any()
     assert np.abs(velocity(it).mean(axis=(1, 2, 3))).max() < 1e-16
 
 
@@ -161,8 +161,8 @@ def test_asking_changes_nothing_and_only_the_step_asked_for_last_is_taken():
         it.advance(first, ZERO)
     for one in (it, other):
         coast(one, 0.2, 0.7)
-    assert np.array_equal(it.past.now, other.past.now)
-    assert np.array_equal(it.past.n_now, other.past.n_now)
+    assert np.array_equal(it.history.now, other.history.now)
+    assert np.array_equal(it.history.n_now, other.history.n_now)
 
 
 def test_operators_are_made_when_the_step_changes_and_not_for_its_round_off():
@@ -184,8 +184,8 @@ def test_memory_is_all_there_is():
     )
     for one in (it, other):
         coast(one, 0.1, 0.5)
-    assert np.array_equal(it.past.now, other.past.now)
-    assert (it.time, it.fastest, it.past.dt_old) == (other.time, other.fastest, other.past.dt_old)
+    assert np.array_equal(it.history.now, other.history.now)
+    assert (it.time, it.fastest, it.history.dt_old) == (other.time, other.fastest, other.history.dt_old)
 
 
 # --- rods that stir it (rotation = "grid") ---------------------------------------------------------------------------
@@ -195,8 +195,8 @@ def stirred() -> tuple[NavierStokes, Nodes]:
     """A fluid with one node that stirs it, and the node."""
     grid, axis = Grid([2 * np.pi] * 3, [16] * 3), np.array([[0.6, 0.0, 0.8]])
     made = Immersed(grid, KERNELS["peskin4"], 0.3, np.zeros(1), None, coupling=TorqueCoupling(np.zeros(1), np.ones(1)))
-    room = Room(grid, vectors=2)
-    return NavierStokes(made, 2.0, lambda alpha: StokesByTable(made, alpha), room), made.nodes(FAR, axis)
+    workspace = Workspace(grid, vectors=2)
+    return NavierStokes(made, 2.0, lambda alpha: StokesByTable(made, alpha), workspace), made.nodes(FAR, axis)
 
 
 def test_a_node_turns_with_half_the_vorticity_of_the_past():
@@ -211,7 +211,7 @@ def test_a_node_turns_with_half_the_vorticity_of_the_past():
             )
         )
     )
-    curl = np.fft.irfftn(1j * np.cross(k, it.past.now, axis=0), it.immersed.grid.cells, axes=(1, 2, 3)) * 16**3
+    curl = np.fft.irfftn(1j * np.cross(k, it.history.now, axis=0), it.immersed.grid.cells, axes=(1, 2, 3)) * 16**3
     expected = 0.5 * interpolate(nodes.base, nodes.weights, curl)[0] @ nodes.axes[0]
     assert abs(expected) > 0.01
     assert spin == pytest.approx(expected, rel=1e-6)
@@ -222,5 +222,5 @@ def test_a_torque_on_fluid_at_rest_leaves_the_flow_that_the_stirred_solve_has():
     tau, push = 0.2, np.array([[0.3, -0.1, 0.2, 0.7]])
     it.advance(it.response(FAR, nodes.axes, 0.0, tau), push)
     solve = TorqueStokesSolve(it.immersed.grid, 0.3, alpha=2.0 / tau)
-    expected = solve.velocity(nodes.base, nodes.weights, it.immersed.coupling.lift(nodes.axes, push))[0, :3]
+    expected = solve.velocity(nodes.base, nodes.weights, it.immersed.coupling.to_grid(nodes.axes, push))[0, :3]
     assert it.velocity_at(FAR, FAR, nodes.axes, push, tau)[0] == pytest.approx(expected, rel=1e-10)

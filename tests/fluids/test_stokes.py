@@ -11,9 +11,9 @@ from ibfil.fluids.stokes import StokesByFFT, StokesByTable, StokesSolve
 from ibfil.grid.kernels import KERNELS, Kernel
 from ibfil.grid.periodic_grid import Grid
 from ibfil.linalg import gmres
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 
-NOTHING = Held(np.zeros(0, np.int64), np.zeros(0))
+NOTHING = Prescribed(np.zeros(0, np.int64), np.zeros(0))
 
 
 def immersed(grid: Grid, nodes: int, kernel: Kernel = KERNELS["peskin4"], eta=1.0, slip=0.0, **more) -> Immersed:
@@ -109,7 +109,7 @@ def drag(nodes: int, cells: int, fraction: float = 0.0) -> tuple[float, float]:
     for axis in (0, 1):
         whole = zero.copy()
         whole[:, axis] = 0.25  # a velocity of 1
-        answer = response.forced(zero, Held(np.arange(3 * nodes), whole.ravel()), zero)
+        answer = response.forced(zero, Prescribed(np.arange(3 * nodes), whole.ravel()), zero)
         assert answer.reaction.sum(axis=0) == pytest.approx(np.eye(3)[axis] * answer.reaction[:, axis].sum(), abs=1e-9)
         out.append(float(answer.reaction[:, axis].sum()))
     return out[0], out[1]
@@ -187,7 +187,7 @@ def test_back_pressure_carries_the_force_that_holds_a_rod():
     grid = Grid([2.0] * 3, [24] * 3)
     fluid = immersed(grid, n)
     r = np.column_stack([np.linspace(-0.5, 0.5, n), np.zeros(n), np.zeros(n)])
-    held = Held(np.arange(3), np.zeros(3))
+    held = Prescribed(np.arange(3), np.zeros(3))
     force = np.tile([0.0, 0.0, 1.0], (n, 1))
     answer = StokesByTable(fluid).response(r, r, 0.0, 0.01).forced(force, held, np.zeros((n, 3)))
     net = answer.force.sum(axis=0)

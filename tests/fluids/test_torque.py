@@ -15,9 +15,9 @@ from helpers.scenes import bare, run, slopes, twisting_rod
 from scipy.integrate import solve_ivp
 
 from ibfil.rods.elastic_force import nodal_force
-from ibfil.rods.geometry import Geometry
+from ibfil.rods.geometry import Configuration
 from ibfil.rods.mesh import Segmented
-from ibfil.rods.system import Mechanics
+from ibfil.rods.system import RodSystem
 from ibfil.rods.torque_free import TorqueFree
 
 A1, A2, C, EA = 1.0, 0.3, 0.7, 50.0
@@ -85,12 +85,12 @@ def continuum_torque() -> np.ndarray:
     return (weights[:, None] * values).sum(axis=0) * (s[1] - s[0]) / 3
 
 
-def rods(s: np.ndarray, derivative: int, kind: type[Mechanics] = Mechanics) -> Mechanics:
+def rods(s: np.ndarray, derivative: int, kind: type[RodSystem] = RodSystem) -> RodSystem:
     part = Segmented(s, derivative, None, None)
     return bare([part], kind=kind, bending=(A1, A2), torsion=C, stretching=EA)
 
 
-def total(r: np.ndarray, shape: Geometry, force: np.ndarray) -> np.ndarray:
+def total(r: np.ndarray, shape: Configuration, force: np.ndarray) -> np.ndarray:
     """Sum of r x f and of the twist torque about the tangent (3,)."""
     return np.cross(r, force[:, :3]).sum(axis=0) + (force[:, 3:] * shape.e3).sum(axis=0)
 
@@ -189,7 +189,7 @@ def test_the_torque_free_variant_is_eq_44_to_second_order_on_an_unstretched_rod(
     for nodes in SIZES:
         s, r, e1 = curve(nodes)
         both = []
-        for kind in (Mechanics, TorqueFree):
+        for kind in (RodSystem, TorqueFree):
             rod = rods(s, derivative, kind)
             both.append(rod.forces(rod.start(r, e1), 0.0)[0] / rod.mesh.volume[:, None])
         difference = (both[1] - both[0])[nodes // 8 : -(nodes // 8)]
@@ -207,11 +207,11 @@ def test_a_free_rod_in_motion_feels_no_net_force_and_by_the_variant_no_net_torqu
     for kind in ("eq44", "torque-free"):
         rod = {**keys, "force": kind}
         simulation = run(twisting_rod(rod=rod, end=0.4, step=0.004, scheme=scheme))
-        frame = simulation.frame()
-        force = frame.filaments["rod"].force
+        snapshot = simulation.snapshot()
+        force = snapshot.filaments["rod"].force
         scale = np.linalg.norm(force, axis=1).sum()
-        assert size(frame.diagnostics["net_force"]) < 1e-12 * scale
-        torque[kind] = size(frame.diagnostics["net_torque"]) / scale
+        assert size(snapshot.diagnostics["net_force"]) < 1e-12 * scale
+        torque[kind] = size(snapshot.diagnostics["net_torque"]) / scale
     if scheme == "implicit":
         left = 4 * np.pi * 1e-8 / (0.004 * 2 / 3) / scale
         assert torque["torque-free"] < left

@@ -17,11 +17,11 @@ from ibfil.grid import spectral
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
 from ibfil.grid.spreading import interpolate, spread
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 
 KERNEL = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 H = 0.1
-NONE = Held(np.zeros(0, np.int64), np.zeros(0))
+NONE = Prescribed(np.zeros(0, np.int64), np.zeros(0))
 
 
 def tangents(count: int, seed: int) -> np.ndarray:
@@ -123,8 +123,8 @@ def test_power_of_forces_and_torques_is_what_the_fluid_and_the_slips_dissipate()
     answer = StokesByTable(fluid).response(r, e3, 0.0, 1.0).forced(force, NONE, np.zeros((count, 4)))
     coupling, (base, weights) = fluid.coupling, fluid.stencil(r)
     fields = GridFields(fluid.grid, fluid.viscosity, None)
-    pushes = coupling.lift(coupling.axes(e3), force)
-    velocity = fields.evaluate(base, weights, pushes, 0.0, ["velocity"])["velocity"].astype(float)
+    load_rates = coupling.to_grid(coupling.axes(e3), force)
+    velocity = fields.evaluate(base, weights, load_rates, 0.0, ["velocity"])["velocity"].astype(float)
     modes = np.fft.rfftn(np.moveaxis(velocity, -1, 0), axes=(1, 2, 3))
     _, (sx, sy, sz) = fluid.grid.wave_numbers()
     square = sx[:, None, None] + sy[None, :, None] + sz[None, None, :]
@@ -145,9 +145,9 @@ def test_far_from_it_a_torque_drives_a_rotlet():
     grid, kernel, eta = Grid([9.6] * 3, cells), KERNELS["peskin4"], 0.7
     torque, r = np.array([0.3, -0.8, 0.5]), np.array([[0.03, 0.02, -0.01], [0.9, 0.4, -0.5]])
     base, weights = kernel.stencil(grid.coordinates(r))
-    pushes = np.zeros((2, 6))
-    pushes[0, 3:] = torque
-    moved = TorqueStokesSolve(grid, eta).velocity(base, weights, pushes)[1]
+    load_rates = np.zeros((2, 6))
+    load_rates[0, 3:] = torque
+    moved = TorqueStokesSolve(grid, eta).velocity(base, weights, load_rates)[1]
     x = r[1] - r[0]
     d = np.linalg.norm(x)
     u = np.cross(torque, x) / (8 * np.pi * eta * d**3)
@@ -170,9 +170,9 @@ def test_a_torque_is_the_limit_of_a_couple_of_forces():
         force[:4] = np.array([[0, 0, 1], [0, 0, -1], [0, -1, 0], [0, 1, 0]]) / (2 * d)  # torque 1 about x
         couples.append(StokesSolve(grid, 1.0).velocity(base, weights, force)[4])
     base, weights = kernel.stencil(grid.coordinates(np.array([[0.0, 0, 0], there])))
-    pushes = np.zeros((2, 6))
-    pushes[0, 3] = 1.0
-    stirred = TorqueStokesSolve(grid, 1.0).velocity(base, weights, pushes)[1, :3]
+    load_rates = np.zeros((2, 6))
+    load_rates[0, 3] = 1.0
+    stirred = TorqueStokesSolve(grid, 1.0).velocity(base, weights, load_rates)[1, :3]
     errors = [float(np.linalg.norm(couple - stirred) / np.linalg.norm(stirred)) for couple in couples]
     assert slopes(errors) == pytest.approx([2.0, 2.0], abs=0.1)
     assert errors[-1] < 0.01**2  # in units of the box's length over 4.8, in which the flow varies
@@ -195,8 +195,8 @@ def line_spin(kernel: str, along: tuple[int, int, int], ds: float, place: np.nda
     e3 = np.array(along) / np.linalg.norm(along)
     r = (np.arange(count) / count - 0.5)[:, None] * length * e3 + place * H
     base, weights = k.stencil(grid.coordinates(r))
-    pushes = np.hstack([np.zeros((count, 3)), np.tile(e3 * length / count, (count, 1))])
-    return float(np.mean(TorqueStokesSolve(grid, 1.0).velocity(base, weights, pushes)[:, 3:] @ e3))
+    load_rates = np.hstack([np.zeros((count, 3)), np.tile(e3 * length / count, (count, 1))])
+    return float(np.mean(TorqueStokesSolve(grid, 1.0).velocity(base, weights, load_rates)[:, 3:] @ e3))
 
 
 @KERNEL

@@ -125,19 +125,19 @@ def case(cell: Cell, finer: int = 1) -> Case:
 def follow(cell: Cell, finer: int = 1) -> Path:
     """Runs a cell to its end, or to where it fails."""
     simulation = Simulation(case(cell, finer))
-    rods, path = simulation.mechanics, Path([], 0, 0, 0.0, "")
+    rods, path = simulation.system, Path([], 0, 0, 0.0, "")
 
     def watch() -> None:
-        shape = simulation.shape
+        shape = simulation.configuration
         pull = np.sum(rods.moment(shape, simulation.time).bend * shape.bend, axis=1) / cell.stretching
         path.pull = max(path.pull, float(np.max(pull)))
-        path.iterations = max(path.iterations, int(simulation.frame().diagnostics["newton_iterations"]))
+        path.iterations = max(path.iterations, int(simulation.snapshot().diagnostics["newton_iterations"]))
 
     count = LOOKS + _first(cell)
     try:
         for k in range(1, count + 1):
             simulation.advance(simulation.case.time.end * k / count, watch)
-            path.looks.append((simulation.shape.r, simulation.shape.length[:-1] / rods.mesh.ds[:-1]))
+            path.looks.append((simulation.configuration.r, simulation.configuration.length[:-1] / rods.mesh.ds[:-1]))
     except RunFailed as failed:
         watch()
         path.words = str(failed)

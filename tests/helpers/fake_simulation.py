@@ -17,7 +17,7 @@ from ibfil.case.reading import parse_case
 from ibfil.case.schema import Case
 from ibfil.check.overview import Overview, overview_of
 from ibfil.errors import RunFailed
-from ibfil.io.frames import FilamentFrame, Frame
+from ibfil.io.snapshots import FilamentSnapshot, Snapshot
 
 CASE = """
 title = "a fake"
@@ -107,19 +107,19 @@ class FakeSimulation:
                 clock.sleep(self.pause)
             after_step()
 
-    def frame(self, fields: Sequence[str] = ()) -> Frame:
+    def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
         """The map's values in y, and in everything else so that no two arrays are equal."""
         n = len(self.y)
         x = np.linspace(0, self.case.filaments[self.name].length, n)
         r = np.column_stack([x, self.y, self.y**2])
-        rod = FilamentFrame(r, 2 * r, 3 * r, 4 * r, 5 * r, 6 * r, 7 * self.y[1:], 8 * r[0], None)
+        rod = FilamentSnapshot(r, 2 * r, 3 * r, 4 * r, 5 * r, 6 * r, 7 * self.y[1:], 8 * r[0], None)
         grid = None
         if fields:
             nx, ny, nz = self.grid.cells
             base = np.arange(nx * ny * nz * 3, dtype=np.float32).reshape(nx, ny, nz, 3)
             grid = {field: base + np.float32(self.time) for field in fields}
         diagnostics = {"net_force": r.sum(axis=0), "power": self.before, "newton_iterations": 2.0}
-        return Frame(self.time, {self.name: rod}, diagnostics, grid)
+        return Snapshot(self.time, {self.name: rod}, diagnostics, grid)
 
     def state(self) -> dict[str, np.ndarray | float | int | str]:
         """All of it, the random numbers with integers of 128 bits."""

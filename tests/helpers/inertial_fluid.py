@@ -6,16 +6,16 @@ import numpy as np
 
 from ibfil.fluids.advection import filters
 from ibfil.fluids.background_flow import Background
-from ibfil.fluids.history import Past, Weights
+from ibfil.fluids.history import History, Weights
 from ibfil.fluids.immersed_boundary import Immersed
-from ibfil.fluids.navier_stokes import NavierStokes, Room
+from ibfil.fluids.navier_stokes import NavierStokes, Workspace
 from ibfil.fluids.stokes import StokesByTable
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
 from ibfil.grid.slab_fft import Block
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 
-NOTHING = Held(np.zeros(0, np.int64), np.zeros(0))
+NOTHING = Prescribed(np.zeros(0, np.int64), np.zeros(0))
 FAR = np.array([[0.3, -0.2, 0.1]])  # a node to ask at
 ZERO = np.zeros((1, 3))
 
@@ -25,7 +25,7 @@ def fluid(cells=(16, 16, 16), density=1.0, viscosity=0.1, flow=None, parts=None)
     grid = Grid([2 * np.pi * n / cells[0] for n in cells], cells)
     made = Immersed(grid, KERNELS["peskin4"], viscosity, np.zeros(1), None, flow)
     background = None if flow is None else Background(grid, flow, parts)
-    return NavierStokes(made, density, lambda alpha: StokesByTable(made, alpha), Room(grid), background)
+    return NavierStokes(made, density, lambda alpha: StokesByTable(made, alpha), Workspace(grid), background)
 
 
 def low(it: NavierStokes) -> np.ndarray:
@@ -39,19 +39,19 @@ def low(it: NavierStokes) -> np.ndarray:
 def begin(it: NavierStokes, *fields: np.ndarray) -> None:
     """Gives it the velocities (3, nx, ny, nz) of its last steps, the oldest first, and their advection."""
     for u in fields:
-        past = it.past
+        past = it.history
         past.old, past.now, past.n_old, past.n_now = past.now, past.old, past.n_now, past.n_old
-        past.now[:] = np.fft.rfftn(u, axes=(1, 2, 3)) / it.room.flow.size
-        modes, k = it.room.flow.modes, np.stack(np.meshgrid(*it.immersed.grid.wave_numbers()[0], indexing="ij"))
+        past.now[:] = np.fft.rfftn(u, axes=(1, 2, 3)) / it.workspace.flow.size
+        modes, k = it.workspace.flow.modes, np.stack(np.meshgrid(*it.immersed.grid.wave_numbers()[0], indexing="ij"))
         modes[:3] = past.now * smooth(it)
         modes[3:] = 1j * np.cross(k, modes[:3], axis=0)
         it._advect(past.n_now)
-    it.past.dt_old = 1.0
+    it.history.dt_old = 1.0
 
 
 def velocity(it: NavierStokes) -> np.ndarray:
     """Its present velocity (3, nx, ny, nz)."""
-    return np.fft.irfftn(it.past.now, it.immersed.grid.cells, axes=(1, 2, 3)) * it.room.flow.size
+    return np.fft.irfftn(it.history.now, it.immersed.grid.cells, axes=(1, 2, 3)) * it.workspace.flow.size
 
 
 def smooth(it: NavierStokes) -> np.ndarray:
@@ -67,10 +67,10 @@ def advection(it: NavierStokes) -> np.ndarray:
 
 def felt(it: NavierStokes, n_now: float, n_old: float) -> np.ndarray:
     """The modes of so much of its advection now and before."""
-    past = Past(it.immersed.grid, it.density, 0.0)
-    past.n_now, past.n_old = it.past.n_now, it.past.n_old
+    past = History(it.immersed.grid, it.density, 0.0)
+    past.n_now, past.n_old = it.history.n_now, it.history.n_old
     block = Block(np.zeros_like(past.now), 0, 0)
-    past.coast(Weights(1.0, 0.0, 0.0, n_now, n_old, 1.0), block)
+    past.predict(Weights(1.0, 0.0, 0.0, n_now, n_old, 1.0), block)
     return block.modes
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ibfil.linalg import banded
-from ibfil.rods.system import Mechanics
+from ibfil.rods.system import RodSystem
 
 
-def numerical_jacobian(rods: Mechanics, start, y: np.ndarray, h: float = 1e-6) -> np.ndarray:
+def numerical_jacobian(rods: RodSystem, start, y: np.ndarray, h: float = 1e-6) -> np.ndarray:
     """Central differences of the forces with respect to the displacements y (n, m) from ``start``."""
     n, m = y.shape
     out = np.zeros((n, m, n, m))
@@ -22,7 +22,7 @@ def numerical_jacobian(rods: Mechanics, start, y: np.ndarray, h: float = 1e-6) -
     return out
 
 
-def assert_exact_jacobian(rods: Mechanics, start, y: np.ndarray) -> None:
+def assert_exact_jacobian(rods: RodSystem, start, y: np.ndarray) -> None:
     """Each of the four blocks (force, torque) x (position, turn) to 1e-7 of its largest entry.
 
     Central differences with h = 1e-6 err by h^2 f'''/6 and eps f/h: some 1e-9 of the largest entry here.

@@ -8,7 +8,7 @@ import numpy as np
 
 from ibfil.case.reading import parse_case
 from ibfil.case.schema import Case
-from ibfil.io.frames import FilamentFrame, Frame
+from ibfil.io.snapshots import FilamentSnapshot, Snapshot
 from ibfil.io.writer import GridPlace, Meaning, Recorder
 from ibfil.observables.factory import observers
 
@@ -96,17 +96,17 @@ def flow(x: np.ndarray, y: np.ndarray, z: np.ndarray, time: float) -> np.ndarray
     return np.stack([x + 10 * y + 100 * z, x * y + time, z - 7 * time * x], axis=-1)
 
 
-def filament(s: np.ndarray, time: float, number: int) -> FilamentFrame:
+def filament(s: np.ndarray, time: float, number: int) -> FilamentSnapshot:
     """A straight filament along x that glides along y, its arrays all different."""
     n = len(s)
     r = np.column_stack([s, SPEED * time + 0 * s, np.full(n, float(number))])
     velocity = np.tile([0.0, SPEED, 0.0], (n, 1))
     e1 = np.tile([0.0, 0.0, 1.0], (n, 1))
     tension = np.arange(1.0, n) + time
-    return FilamentFrame(r, velocity, 2 * r, e1, 3 * r, 4 * r, tension, None, None)
+    return FilamentSnapshot(r, velocity, 2 * r, e1, 3 * r, 4 * r, tension, None, None)
 
 
-def frame(case: Case, time: float, fields: bool) -> Frame:
+def snapshot(case: Case, time: float, fields: bool) -> Snapshot:
     """The made scene at one time."""
     filaments = {
         name: filament(np.linspace(0, rod.length, rod.nodes), time, number)
@@ -120,7 +120,7 @@ def frame(case: Case, time: float, fields: bool) -> Frame:
         "stretch_max": 0.1,
         "stretch_min": -time,
     }
-    return Frame(time, filaments, diagnostics, grid)
+    return Snapshot(time, filaments, diagnostics, grid)
 
 
 def make_run(path: Path, until: float = 1.0, status: str = "finished") -> Path:
@@ -129,18 +129,18 @@ def make_run(path: Path, until: float = 1.0, status: str = "finished") -> Path:
     seen = observers(case)
     recorder = None
     for i in range(round(until / 0.25) + 1):
-        now = frame(case, 0.25 * i, fields=i % 2 == 0)
-        values = seen.take(now)
+        now = snapshot(case, 0.25 * i, fields=i % 2 == 0)
+        values = seen.record(now)
         if recorder is None:
             meanings = {k: Meaning(o.dimension, o.description) for k, o in seen.observables.items()}
-            place = GridPlace(ORIGIN, SPACING, 1)
+            location = GridPlace(ORIGIN, SPACING, 1)
             recorder = Recorder.create(
                 path,
                 case,
                 now,
                 values,
                 meanings,
-                grid=place,
+                grid=location,
                 method="made",
                 groups={"sperm number": 4.5},
                 overwrite=True,

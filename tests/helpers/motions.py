@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ibfil.case.reading import parse_case
-from ibfil.io.frames import FilamentFrame, Frame
+from ibfil.io.snapshots import FilamentSnapshot, Snapshot
 from ibfil.observables.factory import observers
 from ibfil.observables.observers import Summary
 
@@ -39,12 +39,12 @@ def observing(keys: str, more: str = ""):
     return given, observers(given)
 
 
-def frame(time: float, position: np.ndarray, **arrays) -> Frame:
+def snapshot(time: float, position: np.ndarray, **arrays) -> Snapshot:
     """A filament at ``position`` (10, 3) with everything else zero but ``arrays``."""
     zero = np.zeros((NODES, 3))
     held = {"velocity": zero, "force": zero, "e1": zero, "moment": zero, "strain": zero, "tension": np.zeros(NODES - 1)}
     held |= {"reaction_start": np.zeros(3), "reaction_finish": None} | arrays
-    return Frame(time, {"rod": FilamentFrame(position=position, **held)}, {})
+    return Snapshot(time, {"rod": FilamentSnapshot(position=position, **held)}, {})
 
 
 def seen(keys: str, motion, times) -> tuple[np.ndarray, Summary]:
@@ -53,7 +53,7 @@ def seen(keys: str, motion, times) -> tuple[np.ndarray, Summary]:
     for time in times:
         given = motion(time)
         position, arrays = given if isinstance(given, tuple) else (given, {})
-        looking.take(frame(time, position, **arrays))
+        looking.record(snapshot(time, position, **arrays))
     return looking.series("o"), looking.summaries()["o"]
 
 

@@ -32,7 +32,7 @@ def settled(
 ) -> Simulation:
     """The rod at rest, to round-off: backward Euler with steps far longer than any relaxation."""
     simulation = run(scene({"rod": rod}, fluid, end=end, step=step, order=1))
-    assert np.abs(simulation.frame().filaments["rod"].velocity).max() < 1e-10
+    assert np.abs(simulation.snapshot().filaments["rod"].velocity).max() < 1e-10
     return simulation
 
 

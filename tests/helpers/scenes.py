@@ -17,7 +17,7 @@ from ibfil.case.schema import Case
 from ibfil.rods.constitutive import Linear
 from ibfil.rods.loads import Follower
 from ibfil.rods.mesh import Segmented, stack
-from ibfil.rods.system import Mechanics
+from ibfil.rods.system import RodSystem
 from ibfil.simulation.simulation import Simulation
 
 # A grid small enough for tests: nodes further apart than cells, so nothing locks (numerics.md, 4.3).
@@ -157,14 +157,14 @@ class NoEnds:
 def bare(
     parts: Sequence[Segmented],
     *,
-    kind: type[Mechanics] = Mechanics,
+    kind: type[RodSystem] = RodSystem,
     unknowns: int = 4,
     bending: tuple[float, float] = (1.0, 0.3),
     torsion: float = 0.7,
     stretching: float = 50.0,
     strains: Callable[[np.ndarray], np.ndarray] = lambda s: np.zeros((len(s), 3)),
     followers: Mapping[int, float] | None = None,
-) -> Mechanics:
+) -> RodSystem:
     """Mechanics without a case: spacing as it pleases, nothing held, no moment at ends that are not clamped.
 
     ``strains`` (of s) gives kappa1, kappa2, tau0 (n, 3); ``followers`` forces along e3 by node.

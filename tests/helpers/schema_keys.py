@@ -72,10 +72,10 @@ def needed(table: type[BaseModel]) -> dict[str, Any]:
 def put(scene: dict[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
     """A copy of the scene with the key set."""
     scene = copy.deepcopy(scene)
-    place: Any = scene
+    location: Any = scene
     for part in path[:-1]:
-        place = place[int(part)] if isinstance(place, list) else place.setdefault(part, {})
-    place[path[-1]] = value
+        location = location[int(part)] if isinstance(location, list) else location.setdefault(part, {})
+    location[path[-1]] = value
     return scene
 
 

@@ -58,7 +58,7 @@ def walk(simulation: Simulation, steps: int) -> None:
 def blocks(simulation: Simulation) -> np.ndarray:
     """Z (n, m, m) of every node, from the case alone: half a segment at an end."""
     rod = next(iter(simulation.case.filaments.values()))
-    e3, m = simulation.shape.e3, simulation.mechanics.unknowns
+    e3, m = simulation.configuration.e3, simulation.system.unknowns
     volume = np.full(len(e3), rod.length / (rod.nodes - 1))
     volume[:: rod.nodes] /= 2
     volume[rod.nodes - 1 :: rod.nodes] /= 2

@@ -8,35 +8,35 @@ from pathlib import Path
 import numpy as np
 
 from helpers.fake_simulation import FakeSimulation, case
-from ibfil.io.frames import Frame
+from ibfil.io.snapshots import Snapshot
 from ibfil.io.writer import Meaning, Recorder
 
 MEANINGS = {"tip": Meaning("length", "position of the tip")}
 
 
-def frames(count: int, given=None) -> Iterator[Frame]:
+def snapshots(count: int, given=None) -> Iterator[Snapshot]:
     """``count`` frames of a fake run, 0.05 apart."""
     simulation = FakeSimulation(given or case())
     for i in range(count):
         simulation.advance(0.05 * i, lambda: None)
-        yield simulation.frame()
+        yield simulation.snapshot()
 
 
-def series(frame: Frame) -> dict[str, np.ndarray]:
+def series(snapshot: Snapshot) -> dict[str, np.ndarray]:
     """What the one observable sees."""
-    return {"tip": frame.filaments["rod"].position[-1]}
+    return {"tip": snapshot.filaments["rod"].position[-1]}
 
 
-def begin(path: Path, frame: Frame, **more) -> Recorder:
+def begin(path: Path, snapshot: Snapshot, **more) -> Recorder:
     """A run file with its first output."""
-    return Recorder.create(path, case(), frame, series(frame), MEANINGS, **more)
+    return Recorder.create(path, case(), snapshot, series(snapshot), MEANINGS, **more)
 
 
-def write(path: Path, count: int, **more) -> list[Frame]:
+def write(path: Path, count: int, **more) -> list[Snapshot]:
     """A finished run file of ``count`` outputs; the frames in it."""
-    shown = list(frames(count))
+    shown = list(snapshots(count))
     record = begin(path, shown[0], **more)
-    for frame in shown[1:]:
-        record.append(frame, series(frame))
+    for snapshot in shown[1:]:
+        record.append(snapshot, series(snapshot))
     record.finish("finished", steps=7, wall_time=1.5)
     return shown

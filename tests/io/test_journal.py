@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.written import begin, frames, series
+from helpers.written import begin, series, snapshots
 
 from ibfil.errors import RunFailed
 from ibfil.io import journal, writer
@@ -144,10 +144,10 @@ def test_a_full_disk_leaves_what_was_written(path, monkeypatch, room):
     """The disk takes ``room`` more pages of 4 kB, in whole or in part, and then no more."""
     monkeypatch.setattr(writer, "_PAUSE", 0)
     monkeypatch.setattr(writer, "_SHARE", 0)
-    shown = list(frames(90))
+    shown = list(snapshots(90))
     record = begin(path, shown[0], expected=4)  # small chunks, so that every few outputs need new room
-    for frame in shown[1:20]:
-        record.append(frame, series(frame))
+    for snapshot in shown[1:20]:
+        record.append(snapshot, series(snapshot))
     left, real = room * 4096, os.pwrite
     ends: dict[int, int] = {}
 
@@ -167,8 +167,8 @@ def test_a_full_disk_leaves_what_was_written(path, monkeypatch, room):
 
         def append_all():
             nonlocal written
-            for frame in shown[20:]:
-                record.append(frame, series(frame))
+            for snapshot in shown[20:]:
+                record.append(snapshot, series(snapshot))
                 written += 1
 
         with pytest.raises(RunFailed, match=r"run\.h5 cannot be written \(No space left on device\)") as caught:
@@ -179,8 +179,8 @@ def test_a_full_disk_leaves_what_was_written(path, monkeypatch, room):
         record.close()
     with RunFile(path) as run:
         assert len(run) == written
-        for back, frame in zip(run.frames(), shown, strict=False):
-            assert np.array_equal(back.filaments["rod"].position, frame.filaments["rod"].position)
+        for back, snapshot in zip(run.snapshots(), shown, strict=False):
+            assert np.array_equal(back.filaments["rod"].position, snapshot.filaments["rod"].position)
     writer.record_end(path, "failed", "the disk was full")
     with RunFile(path) as run:
         assert (run.status, run.reason, len(run)) == ("failed", "the disk was full", written)
@@ -191,10 +191,10 @@ def test_a_limit_of_the_system_is_a_failure_and_no_crash(path):
     script = (
         "import resource, sys; sys.path[:0] = sys.argv[2:]; from helpers.written import *\n"
         "from ibfil import errors; from ibfil.io import writer as recorder\n"
-        "recorder._PAUSE = recorder._SHARE = 0; shown = list(frames(60))\n"
+        "recorder._PAUSE = recorder._SHARE = 0; shown = list(snapshots(60))\n"
         "record = begin(Path(sys.argv[1]), shown[0], expected=4)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
-        "try:\n    for frame in shown[1:]: record.append(frame, series(frame))\n"
+        "try:\n    for one in shown[1:]: record.append(one, series(one))\n"
         "except errors.RunFailed as error: print(record.outputs - 1, error); record.close()\n"
     )
     here = Path(__file__).parents[1]
@@ -212,7 +212,7 @@ def test_a_limit_of_the_system_is_a_failure_and_no_crash(path):
 
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path, monkeypatch):
     with pytest.raises(RunFailed, match=r"cannot be written \(No such file or directory\)"):
-        begin(tmp_path / "nowhere" / "run.h5", next(frames(1)))
+        begin(tmp_path / "nowhere" / "run.h5", next(snapshots(1)))
     real = os.open
 
     def read_only(path, flags, *more):  # a test may run as root, who may write everywhere
@@ -222,7 +222,7 @@ def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "open", read_only)
     with pytest.raises(RunFailed, match=r"cannot be written \(Permission denied\)"):
-        begin(tmp_path / "run.h5", next(frames(1)))
+        begin(tmp_path / "run.h5", next(snapshots(1)))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -236,6 +236,6 @@ def test_a_disk_that_is_full_from_the_start_keeps_no_empty_file(tmp_path, monkey
     with monkeypatch.context() as patch:
         patch.setattr(os, "pwrite", pwrite)
         with pytest.raises(RunFailed, match="No space left on device") as caught:
-            begin(path, next(iter(frames(2))))
+            begin(path, next(iter(snapshots(2))))
     assert "nothing was written" in str(caught.value)
     assert list(tmp_path.iterdir()) == []

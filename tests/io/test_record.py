@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.fake_simulation import FakeSimulation, case
-from helpers.written import begin, frames, series, write
+from helpers.written import begin, series, snapshots, write
 
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile, RunFileError
@@ -31,18 +31,18 @@ def test_every_array_is_read_back_bit_for_bit(path):
     with RunFile(path) as run:
         assert len(run) == 5
         assert list(run.filaments) == ["rod"]
-        for i, (back, frame) in enumerate(zip(run.frames(), shown, strict=True)):
-            assert back.time == frame.time == run.time[i]
-            assert back.diagnostics.keys() == frame.diagnostics.keys()
-            for name, value in frame.diagnostics.items():
+        for i, (back, snapshot) in enumerate(zip(run.snapshots(), shown, strict=True)):
+            assert back.time == snapshot.time == run.time[i]
+            assert back.diagnostics.keys() == snapshot.diagnostics.keys()
+            for name, value in snapshot.diagnostics.items():
                 assert np.array_equal(back.diagnostics[name], value)
-            ours, theirs = vars(back.filaments["rod"]), vars(frame.filaments["rod"])
+            ours, theirs = vars(back.filaments["rod"]), vars(snapshot.filaments["rod"])
             assert ours.keys() == theirs.keys()
             for name, value in theirs.items():
                 assert (value is None) == (ours[name] is None)
                 assert value is None or np.array_equal(ours[name], value)
         assert np.array_equal(run.observables["tip"], run.position()[:, -1])
-        assert np.array_equal(run.frame(-2).filaments["rod"].strain, shown[3].filaments["rod"].strain)
+        assert np.array_equal(run.snapshot(-2).filaments["rod"].strain, shown[3].filaments["rod"].strain)
 
 
 def test_layout_is_that_of_the_contract(path):
@@ -89,7 +89,7 @@ def test_every_dataset_has_units_of_the_case_and_a_description(path):
 def test_fields_lie_where_their_attributes_say(path):
     given = case(grid=True)
     simulation = FakeSimulation(given)
-    first = simulation.frame(("velocity",))
+    first = simulation.snapshot(("velocity",))
     place = GridPlace(simulation.grid.origin, simulation.grid.spacing, 3)
     record = begin(path, first, grid=place)
     record.append_fields(0.0, first.grid)
@@ -142,8 +142,8 @@ def test_columns_index_as_arrays_do_and_hide_what_is_not_whole(path):
 
 
 def test_append_copies(path):
-    (frame, after) = frames(2)
-    record = begin(path, frame)
+    (snapshot, after) = snapshots(2)
+    record = begin(path, snapshot)
     position = after.filaments["rod"].position
     kept = position.copy()
     record.append(after, series(after))
@@ -154,8 +154,8 @@ def test_append_copies(path):
 
 
 def test_an_output_unlike_the_first_is_an_error(path):
-    frame, after = frames(2)
-    record = begin(path, frame)
+    snapshot, after = snapshots(2)
+    record = begin(path, snapshot)
     with pytest.raises(ValueError, match="observables/other was not in the first output"):
         record.append(after, {"other": 1.0})
     record.close()
@@ -178,7 +178,7 @@ def test_a_run_file_is_not_written_over_unless_asked(path):
 def test_two_writers_on_one_file_are_refused(path):
     script = (
         "import sys; sys.path[:0] = sys.argv[2:]; from helpers.written import *\n"
-        "record = begin(Path(sys.argv[1]), next(frames(1))); print('open', flush=True); sys.stdin.read()"
+        "record = begin(Path(sys.argv[1]), next(snapshots(1))); print('open', flush=True); sys.stdin.read()"
     )
     here = Path(__file__).parents[1]
     other = subprocess.Popen(
@@ -190,7 +190,7 @@ def test_two_writers_on_one_file_are_refused(path):
         assert other.stdout.readline() == b"open\n"
         before = path.read_bytes()
         for attempt in (
-            lambda: begin(path, next(frames(1)), overwrite=True),
+            lambda: begin(path, next(snapshots(1)), overwrite=True),
             lambda: Recorder.resume(path, case(), 0, 0),
         ):
             with pytest.raises(RunFileError, match="is being written by another ibfil") as caught:
@@ -203,7 +203,7 @@ def test_two_writers_on_one_file_are_refused(path):
         other.communicate(timeout=300)
     with RunFile(path) as run:
         assert run.status == "cut"  # it never said how it ended
-    begin(path, next(frames(1)), overwrite=True).close()
+    begin(path, next(snapshots(1)), overwrite=True).close()
 
 
 def test_what_is_no_run_file_is_refused_in_one_line(tmp_path):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.motions import CASE, LENGTH, NODES, RNG, S, frame, observing, seen, straight, tip_at, value
+from helpers.motions import CASE, LENGTH, NODES, RNG, S, observing, seen, snapshot, straight, tip_at, value
 
 from ibfil.case.reading import parse_case
 from ibfil.observables.factory import observers
-from ibfil.observables.place import Place
+from ibfil.observables.location import Location
 
 # --- places ----------------------------------------------------------------------------------------------------------
 
@@ -24,28 +24,28 @@ def cubic(s: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("uneven", [False, True])
 def test_points_of_a_cubic_are_exact(at, s, uneven):
     nodes = 2.0 * np.linspace(0, 1, NODES) ** 1.5 if uneven else S
-    assert Place(nodes, at).values(cubic(nodes))[0] == pytest.approx(cubic(np.array(s)), abs=1e-12)
+    assert Location(nodes, at).values(cubic(nodes))[0] == pytest.approx(cubic(np.array(s)), abs=1e-12)
 
 
 def test_a_node_is_itself_bit_for_bit():
     field = RNG.random((NODES, 3))
     for i, s in enumerate(S):
-        assert np.array_equal(Place(S, float(s)).values(field)[0], field[i])
+        assert np.array_equal(Location(S, float(s)).values(field)[0], field[i])
 
 
 @pytest.mark.parametrize("at", ["centroid", (0.3, 1.7), (0.0, 2.0), (0.31, 0.33)])
 @pytest.mark.parametrize("uneven", [False, True])
 def test_means_of_a_straight_line_are_exact(at, uneven):
     nodes = 2.0 * np.linspace(0, 1, NODES) ** 1.5 if uneven else S
-    place = Place(nodes, at)
+    location = Location(nodes, at)
     middle = 1.0 if at == "centroid" else 0.5 * (at[0] + at[1])
-    assert place.reduced(place.values(3 * nodes - 1), "mean") == pytest.approx(3 * middle - 1, abs=1e-12)
+    assert location.reduced(location.values(3 * nodes - 1), "mean") == pytest.approx(3 * middle - 1, abs=1e-12)
 
 
 def test_extremes_of_a_window_count_its_ends():
-    place = Place(S, (0.3, 1.7))
-    assert place.reduced(place.values(S), "min") == pytest.approx(0.3)
-    assert place.reduced(place.values(S), "max") == pytest.approx(1.7)
+    location = Location(S, (0.3, 1.7))
+    assert location.reduced(location.values(S), "min") == pytest.approx(0.3)
+    assert location.reduced(location.values(S), "max") == pytest.approx(1.7)
 
 
 # --- kinds that are read off each output -----------------------------------------------------------------------------
@@ -88,9 +88,9 @@ def test_displacement_is_from_the_first_output():
 def test_displacement_does_not_hold_on_to_the_simulations_memory():
     memory = straight()
     _, looking = observing('kind = "displacement"\nalong = [1, 0, 0]')
-    looking.take(frame(0.0, memory))
+    looking.record(snapshot(0.0, memory))
     memory += 1.0
-    assert looking.take(frame(1.0, memory))["o"] == pytest.approx(1.0)
+    assert looking.record(snapshot(1.0, memory))["o"] == pytest.approx(1.0)
 
 
 def test_end_to_end():
@@ -183,7 +183,7 @@ def test_couples_of_the_supports_hold_a_bent_and_twisted_rod():
     text = CASE.replace("[fluid]", 'finish = { end = "clamped" }\n[fluid]')
     text += '[observe.a]\nkind = "torque"\nat = "start"\n[observe.b]\nkind = "torque"\nat = "finish"\n'
     looking = observers(parse_case(text, "case.toml"))
-    found = looking.take(frame(0.0, straight(), e1=e1, moment=moment, reaction_finish=np.zeros(3)))
+    found = looking.record(snapshot(0.0, straight(), e1=e1, moment=moment, reaction_finish=np.zeros(3)))
     assert found["b"] == pytest.approx(np.array([-0.5, -2.0, 0.1]), abs=1e-12)
     assert found["a"] == pytest.approx(-found["b"], abs=1e-12)
 

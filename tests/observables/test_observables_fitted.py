@@ -145,13 +145,13 @@ def test_frequency_of_the_start_is_seen_from_the_centroid():
 
 def shuffled_walk(along: float, across: float, shape, count: int = 200):
     """A shape that moves, from output to output, by ``along`` its axis and ``across`` it, and turns meanwhile."""
-    place, places, axes = np.zeros(3), [], []
+    location, places, axes = np.zeros(3), [], []
     for k in range(count + 1):
         axis = np.array([np.cos(0.3 * k), np.sin(0.3 * k), 0.0])
-        places.append(place.copy())
+        places.append(location.copy())
         axes.append(axis)
         normal = np.array([0.0, 0.0, 1.0]) if k % 2 else np.cross([0, 0, 1], axis)
-        place = place + along * axis * (-1) ** k + across * normal
+        location = location + along * axis * (-1) ** k + across * normal
     return lambda t: shape(axes[round(10 * t)]) + places[round(10 * t)]
 
 

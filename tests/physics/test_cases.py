@@ -29,11 +29,11 @@ def test_a_shipped_case_has_a_title_a_source_and_a_number_with_one(name):
 @pytest.mark.parametrize("name", CASES)
 def test_the_quick_form_of_a_shipped_case_meets_its_numbers(name):
     told: list[str] = []
-    assert verify([name], quick=True, say=told.append) == 0, "\n".join(told)
+    assert verify([name], quick=True, log=told.append) == 0, "\n".join(told)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CASES if _quicker(name)])
 def test_the_full_form_of_a_shipped_case_meets_its_numbers(name):
     told: list[str] = []
-    assert verify([name], quick=False, say=told.append) == 0, "\n".join(told)
+    assert verify([name], quick=False, log=told.append) == 0, "\n".join(told)

@@ -20,7 +20,7 @@ from ibfil.case.schema import Case
 from ibfil.check.warnings import warnings
 from ibfil.fluids import immersed_boundary
 from ibfil.fluids.immersed_boundary import slip_mobility
-from ibfil.rods.geometry import Geometry
+from ibfil.rods.geometry import Configuration
 from ibfil.simulation.simulation import Simulation
 
 Build = Callable[..., Case]
@@ -47,15 +47,15 @@ def soft_twisting(**time: Any) -> Case:
 
 
 @cache
-def reference(build: Build, end: float, count: int) -> Geometry:
+def reference(build: Build, end: float, count: int) -> Configuration:
     """The path by BDF2 in many steps."""
-    return run(build(end=end, step=end / count)).shape
+    return run(build(end=end, step=end / count)).configuration
 
 
 def errors(build: Build, end: float, fine: int, counts: tuple[int, ...], **keys: Any) -> tuple[list, list]:
     """Errors at the end of positions and of e1, rms over nodes, in so many steps."""
     exact = reference(build, end, fine)
-    shapes = [run(build(end=end, step=end / count, **keys)).shape for count in counts]
+    shapes = [run(build(end=end, step=end / count, **keys)).configuration for count in counts]
     return [rms(g.r - exact.r) for g in shapes], [rms(g.e1 - exact.e1) for g in shapes]
 
 
@@ -87,7 +87,7 @@ def test_the_explicit_scheme_is_first_order_and_finds_the_same_path(build: Build
 
 @pytest.mark.parametrize("build", [swimming, twisting], ids=["swimmer", "twisting rod"])
 def test_the_scene_moves_and_bends_and_twists_enough_to_tell(build: Build) -> None:
-    start, end = Simulation(build(end=0.4, step=0.4)).shape, reference(build, 0.4, 1280)
+    start, end = Simulation(build(end=0.4, step=0.4)).configuration, reference(build, 0.4, 1280)
     assert rms(end.r - start.r) > 0.05
     assert np.abs(end.bend[:, 0]).max() > 1.0
     if build is twisting:
@@ -131,8 +131,8 @@ def swim(
     middle, force = [], 0.0
     for k in (1, 2, 3):
         simulation.advance(k * PERIOD, lambda: None)
-        middle.append(simulation.shape.r.mean(axis=0))
-        force = max(force, float(np.abs(simulation.frame().filaments["rod"].force).max()))
+        middle.append(simulation.configuration.r.mean(axis=0))
+        force = max(force, float(np.abs(simulation.snapshot().filaments["rod"].force).max()))
     return Swim((middle[2] - middle[0])[0] / (2 * PERIOD), force, simulation)
 
 
@@ -162,7 +162,7 @@ def test_speed(nodes, cells, stretching, slip, speed, tolerance, slip_alike):
     found = swim(nodes, cells, stretching, slip)
     assert found.speed == pytest.approx(speed, rel=tolerance)
     assert found.run.shortened == 0
-    assert np.abs(found.run.frame().diagnostics["net_force"]).max() < 1e-12 * found.force
+    assert np.abs(found.run.snapshot().diagnostics["net_force"]).max() < 1e-12 * found.force
 
 
 def test_speed_in_a_thicker_fluid(slip_alike):
@@ -173,7 +173,7 @@ def test_speed_in_a_thicker_fluid(slip_alike):
 def test_positions_on_a_grid_are_of_second_order_in_the_nodes(slip):
     """At fixed cells, nodes h/2 to h/8 apart. With the slip of inner nodes at the ends the order is 0.8."""
     fluid = {**STOKES, "method": "table", "slip": slip}
-    r = [run(swimmer(fluid, rod={"nodes": n}, end=0.15, step=0.025)).shape.r for n in (41, 81, 161)]
+    r = [run(swimmer(fluid, rod={"nodes": n}, end=0.15, step=0.025)).configuration.r for n in (41, 81, 161)]
     d = [rms(fine[::2] - coarse) for coarse, fine in pairwise(r)]
     assert np.log2(d[0] / d[1]) > 1.6
 
@@ -223,9 +223,9 @@ def test_explicit_steps_within_five_per_cent_of_the_limit_are_stable_below_and_n
         step = factor * limit
         case = scene({"rod": rod}, fluid, viscosity=viscosity, scheme="explicit", step=step, end=200 * step)
         simulation = Simulation(case)
-        before = simulation.shape.r
+        before = simulation.configuration.r
         simulation.advance(case.time.end, lambda: None)
-        moved.append(np.abs(simulation.shape.r - before).max())
+        moved.append(np.abs(simulation.configuration.r - before).max())
     assert moved[0] < 1e-10  # without slip a decaying motion may first grow fortyfold
     assert moved[1] > 1e-7
 
@@ -268,9 +268,9 @@ GRID: dict[str, Any] = {"model": "stokes", "box": [1.6, 2.0, 2.4], "cells": [16,
 SAME = 1e-12  # round-off over 20 steps; a shift by a part of a cell makes 1e-3
 
 
-def path(rods: dict[str, dict[str, Any]], fluid: dict[str, Any], **more: Any) -> Geometry:
+def path(rods: dict[str, dict[str, Any]], fluid: dict[str, Any], **more: Any) -> Configuration:
     """Where 20 steps lead."""
-    return run(scene(rods, fluid, **{"end": 0.4, "step": 0.02, **more})).shape
+    return run(scene(rods, fluid, **{"end": 0.4, "step": 0.02, **more})).configuration
 
 
 @RODS
@@ -329,11 +329,11 @@ def test_size_and_viscosity_and_stiffness_drop_out(rod, length, viscosity, bendi
     keys: dict[str, Any] = {"end": 0.2, "step": 0.01, "rod": {"nodes": 13}}
     one = run(build(GRID, **keys))
     two = run(build(GRID, length=length, viscosity=viscosity, bending=bending, **keys))
-    assert np.abs(two.shape.r / length - one.shape.r).max() < SAME
-    assert np.abs(two.shape.e1 - one.shape.e1).max() < SAME
+    assert np.abs(two.configuration.r / length - one.configuration.r).max() < SAME
+    assert np.abs(two.configuration.e1 - one.configuration.e1).max() < SAME
     unit = bending / length**2
-    force = one.frame().filaments["rod"].force
-    assert np.abs(two.frame().filaments["rod"].force / unit - force).max() < 1e-6 * np.abs(force).max()
+    force = one.snapshot().filaments["rod"].force
+    assert np.abs(two.snapshot().filaments["rod"].force / unit - force).max() < 1e-6 * np.abs(force).max()
 
 
 @RODS
@@ -349,12 +349,12 @@ def test_a_run_by_ffts_is_the_run_by_the_table(rod, method, tolerance):
 def test_the_fluid_as_a_whole_does_not_move(rod):
     """A free rod gives no net force; on a held one a uniform back pressure carries what the support gives."""
     simulation = run(scene({"rod": rod}, GRID, end=0.1, step=0.02))
-    frame = simulation.frame(["velocity"])
-    net = np.abs(frame.diagnostics["net_force"]).max()
+    snapshot = simulation.snapshot(["velocity"])
+    net = np.abs(snapshot.diagnostics["net_force"]).max()
     if rod is RIBBON:
         assert net > 0.01
     else:
         assert net < 1e-12
-    velocity = frame.grid["velocity"]
+    velocity = snapshot.grid["velocity"]
     assert np.abs(velocity).max() > 0.01
     assert np.abs(velocity.mean(axis=(0, 1, 2), dtype=float)).max() < 1e-7 * np.abs(velocity).max()  # single precision

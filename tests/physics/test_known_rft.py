@@ -53,7 +53,7 @@ def transverse(case: Case, strain: float = 0.0, turned: np.ndarray | None = None
     Displacements along such a rod, and its twist, do not couple to y and z at first order.
     """
     simulation = Simulation(case)
-    rods, n = simulation.mechanics, len(simulation.arclength)
+    rods, n = simulation.system, len(simulation.arclength)
     angle = np.zeros(n) if turned is None else turned
     r = np.outer(simulation.arclength * (1 + strain), [1.0, 0.0, 0.0])
     shape = rods.start(r, np.stack([np.zeros(n), np.cos(angle), np.sin(angle)], axis=1))
@@ -143,8 +143,8 @@ def test_twist_diffuses_at_c_pi_squared_whatever_the_bending(bending: list[float
     """Eq. 36 on a straight rod is the heat equation in finite volumes: its rates are (2/ds sin(mode ds/2))^2."""
     nodes, c = 33, 1.7
     case = cantilever(nodes, 6, bending=bending, twisting=c, start={"end": "clamped" if clamped else "free"})
-    rods = Simulation(case).mechanics
-    shape = Simulation(case).shape
+    rods = Simulation(case).system
+    shape = Simulation(case).configuration
     _, moment = rods.forces(shape, 0.0)
     matrix = banded.dense(rods.stiffness(shape, shape, moment, 0.0))
     k = matrix[:, 3, :, 3] / (ZETA * 0.01 * L**2 * rods.mesh.volume[:, None])
@@ -175,9 +175,9 @@ def test_a_twisted_rod_untwists_in_time_at_that_rate() -> None:
         shape={"kind": "straight", "twist": f"{eps}*cos(pi*s/{2 * L})"},
     )
     simulation = Simulation(case)
-    before = np.arctan2(simulation.shape.e1[:, 2], simulation.shape.e1[:, 1])
+    before = np.arctan2(simulation.configuration.e1[:, 2], simulation.configuration.e1[:, 1])
     simulation.advance(case.time.end, lambda: None)
-    after = np.arctan2(simulation.shape.e1[:, 2], simulation.shape.e1[:, 1])
+    after = np.arctan2(simulation.configuration.e1[:, 2], simulation.configuration.e1[:, 1])
     expected, older = 1 / (1 + rate * dt), 1.0
     for _ in range(count - 1):
         expected, older = (2 * expected - 0.5 * older) / (1.5 + rate * dt), expected
@@ -268,7 +268,7 @@ def test_flutter_grows_in_time_as_its_eigenvalue_says() -> None:
     )
     tip: list[float] = []
     simulation = Simulation(case)
-    simulation.advance(case.time.end, lambda: tip.append(simulation.shape.r[-1, 2]))
+    simulation.advance(case.time.end, lambda: tip.append(simulation.configuration.r[-1, 2]))
     found, expected = fitted(np.array(tip[200:]), dt), stepped(rate, dt)
     assert abs(found.imag) == pytest.approx(abs(expected.imag), rel=1e-4)
     # EA = 1e6 moves the threshold by F0/EA: 1e-3 of the force times a slope of 7.4 a unit of it.
@@ -292,7 +292,7 @@ def test_whirling_grows_in_time_as_its_eigenvalue_says_and_turns_with_the_clamp(
     )
     tip: list[complex] = []
     simulation = Simulation(case)
-    simulation.advance(case.time.end, lambda: tip.append(complex(*simulation.shape.r[-1, 1:])))
+    simulation.advance(case.time.end, lambda: tip.append(complex(*simulation.configuration.r[-1, 1:])))
     found, expected = fitted(np.array(tip[len(tip) // 2 :]), dt), stepped(rate, dt)
     assert found.imag == pytest.approx(expected.imag, rel=2e-3)
     assert found.real == pytest.approx(expected.real, rel=1e-2)
@@ -318,8 +318,8 @@ def test_a_follower_force_of_200_flails_at_amplitude_0_58_and_compresses_by_one_
     simulation = Simulation(case)
 
     def watch() -> None:
-        tip.append(simulation.shape.r[-1, 2] / L)
-        shortest.append(float(np.min(simulation.shape.length[:-1])) * 40 / L - 1)
+        tip.append(simulation.configuration.r[-1, 2] / L)
+        shortest.append(float(np.min(simulation.configuration.length[:-1])) * 40 / L - 1)
 
     simulation.advance(case.time.end, watch)
     last = slice(len(tip) // 2, None)
@@ -336,10 +336,10 @@ def speed(viscosity: float) -> np.ndarray:
     period = 2 * np.pi / (10 * viscosity)  # in units of eta L^4/A
     case = swimmer(viscosity=viscosity, rate=10 * viscosity, end=3 * period, step=period / 240, rod={"nodes": 64})
     simulation = Simulation(case)
-    volume, places = simulation.mechanics.mesh.volume, []
+    volume, places = simulation.system.mesh.volume, []
     for until in (case.time.end / 3, case.time.end):
         simulation.advance(until, lambda: None)
-        places.append(volume @ simulation.shape.r / volume.sum())
+        places.append(volume @ simulation.configuration.r / volume.sum())
     return (places[1] - places[0]) / (2 * case.time.end / 3)
 
 
@@ -359,7 +359,7 @@ def test_the_swimmer_swims_at_its_known_speed_and_drifts(viscosity: float, known
 @pytest.mark.parametrize("build", [swimmer, twisting_rod], ids=["swimmer", "twisting rod"])
 def test_motion_converges_at_second_order_in_space(build: Callable[..., Case], derivative: int) -> None:
     """RMS at the nodes of nested grids, N and 2 N - 1: Eq. 46 as a sum would show 1.5."""
-    shapes = [run(build(end=0.4, step=0.01, rod={"nodes": n, "derivative": derivative})).shape for n in GRIDS]
+    shapes = [run(build(end=0.4, step=0.01, rod={"nodes": n, "derivative": derivative})).configuration for n in GRIDS]
     positions = [rms(a.r - b.r[::2]) for a, b in pairwise(shapes)]
     assert slopes(positions)[0] == pytest.approx(2.0, abs=0.1)
     if build is twisting_rod:

@@ -24,11 +24,11 @@ def inertial(density: float, **more) -> dict:
 
 def test_the_fluid_keeps_its_momentum_and_that_of_a_free_rod():
     simulation = run(swimmer(inertial(20.0), rod={"nodes": 21}, end=0.1, step=0.01))
-    past = simulation.fluid.past  # type: ignore[attr-defined]
+    past = simulation.fluid.history  # type: ignore[attr-defined]
     assert np.abs(past.now).max() > 1e-4
     assert not past.now[:, 0, 0, 0].any()
-    frame = simulation.frame()
-    force = frame.filaments["rod"].force
+    snapshot = simulation.snapshot()
+    force = snapshot.filaments["rod"].force
     assert np.abs(force.sum(axis=0)).max() < 1e-12 * np.abs(force).max()
 
 
@@ -46,19 +46,19 @@ def test_order_in_time(scheme, order):
             scheme=scheme,
             order=order,
         )
-        ends.append(run(case).shape.r)
+        ends.append(run(case).configuration.r)
     errors = [rms(a - b) for a, b in pairwise(ends)]
     assert slopes(errors)[-1] == pytest.approx(order, abs=0.3)
 
 
 def test_explicit_steps_converge_to_what_implicit_ones_do():
     more = {"rod": {"nodes": 11}, "stretching": 100.0, "end": 0.02}
-    implicit = run(swimmer(inertial(5.0), step=1e-4, **more)).shape.r
+    implicit = run(swimmer(inertial(5.0), step=1e-4, **more)).configuration.r
     simulation = run(swimmer(inertial(5.0), step="auto", scheme="explicit", **more))
     dt = simulation.step_length
     assert 5e-4 < dt < 2e-3
     finer = (run(swimmer(inertial(5.0), step=dt / n, scheme="explicit", **more)) for n in (2, 4))
-    errors = [rms(one.shape.r - implicit) for one in (simulation, *finer)]
+    errors = [rms(one.configuration.r - implicit) for one in (simulation, *finer)]
     assert slopes(errors) == pytest.approx(1, abs=0.15)
 
 
@@ -77,7 +77,7 @@ def test_hardly_any_inertia_is_stokes_flow():
     period = 2 * np.pi / 10
     settings = {"rod": {"nodes": 21}, "end": period, "step": period / 100}
     stokes, almost, far = (
-        run(swimmer(fluid, **settings)).shape.r for fluid in (STOKES, inertial(1e-4), inertial(10.0))
+        run(swimmer(fluid, **settings)).configuration.r for fluid in (STOKES, inertial(1e-4), inertial(10.0))
     )
     assert rms(almost - stokes) < 3e-5
     assert rms(far - stokes) > 1e-3
@@ -120,18 +120,18 @@ def test_a_step_that_fails_and_is_halved_leaves_no_trace_in_the_past(monkeypatch
     assert len(set(np.round(good, 9))) > 2
     for dt in good:
         two.accept(two.attempt(dt), two.time + dt)
-    assert two.shape.r == pytest.approx(one.shape.r, abs=1e-14)
-    assert two.fluid.past.now == pytest.approx(one.fluid.past.now, abs=1e-14)  # type: ignore[attr-defined]
+    assert two.configuration.r == pytest.approx(one.configuration.r, abs=1e-14)
+    assert two.fluid.history.now == pytest.approx(one.fluid.history.now, abs=1e-14)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("density", [1.0, 50.0])
 def test_the_error_keeps_within_the_tolerance(density):
     """A unit time; the swimmer forgets some of it on the way."""
     settings = {"rod": {"nodes": 15}, "stretching": 300.0, "end": 0.6}
-    reference = run(swimmer(inertial(density), step=0.6 / 600, **settings)).shape.r
+    reference = run(swimmer(inertial(density), step=0.6 / 600, **settings)).configuration.r
     for tolerance in (0.1, 0.01):
         simulation = run(swimmer(inertial(density), tolerance=tolerance, **settings))
-        assert tolerance / 50 < rms(simulation.shape.r - reference) / 0.6 < tolerance
+        assert tolerance / 50 < rms(simulation.configuration.r - reference) / 0.6 < tolerance
         assert simulation.steps < 60
 
 
@@ -165,7 +165,7 @@ def test_single_precision_keeps_single_fields_and_is_off_by_a_millionth():
     runs = []
     for precision in ("double", "single"):
         simulation = run(swimmer({**inertial(10.0), "precision": precision}, rod={"nodes": 21}, end=0.2, step=0.02))
-        past = simulation.fluid.past  # type: ignore[attr-defined]
+        past = simulation.fluid.history  # type: ignore[attr-defined]
         assert {f.itemsize for f in (past.now, past.old, past.n_now, past.n_old)} == {8 if runs else 16}
-        runs.append(simulation.shape.r)
+        runs.append(simulation.configuration.r)
     assert 1e-14 < rms(runs[0] - runs[1]) < 1e-6

@@ -155,7 +155,7 @@ def test_a_part_without_its_runs_is_told_and_the_others_go_on(tmp_path, capsys, 
 
 def test_runs_are_opened_when_asked_for(tmp_path):
     member = Member("tiny", "hanging_rod", ("time.end=5",))
-    runs = Runs(run_members([member, Member("other", "no_such_case")], tmp_path, say=lambda line: None), tmp_path)
+    runs = Runs(run_members([member, Member("other", "no_such_case")], tmp_path, log=lambda line: None), tmp_path)
     assert list(runs) == ["tiny"]
     assert runs["tiny"].time[-1] == 5
     assert runs.seconds("tiny") > 0

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 
 from ibfil.case.reading import quick_case, read_case
 from ibfil.case.schema import Case
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping.implicit import Implicit
 
@@ -94,10 +94,10 @@ def test_a_helix_in_resistive_force_theory_has_the_thrust_and_torque_of_its_coef
     thrust = length * p["R"] * (p["par"] - p["perp"]) * sin * cos
     torque = length * (p["R"] ** 2 * (p["par"] * sin**2 + p["perp"] * cos**2) + p["spin"] * cos**2)
     along = length * (p["par"] * cos**2 + p["perp"] * sin**2)
-    rod = held.frame().filaments["helix"]
+    rod = held.snapshot().filaments["helix"]
     assert rod.force[:, 0].sum() == pytest.approx(thrust, rel=2e-3)
-    assert held.frame().diagnostics["net_torque"][0] == pytest.approx(torque, rel=2e-3)
-    assert swims.frame().filaments["helix"].velocity[:, 0].mean() == pytest.approx(-thrust / along, rel=2e-3)
+    assert held.snapshot().diagnostics["net_torque"][0] == pytest.approx(torque, rel=2e-3)
+    assert swims.snapshot().filaments["helix"].velocity[:, 0].mean() == pytest.approx(-thrust / along, rel=2e-3)
 
 
 @pytest.mark.slow
@@ -125,16 +125,16 @@ def test_gray_and_hancock_are_wrong_by_more_than_twice_at_small_pitch():
 def growth(case: Case) -> complex:
     """The eigenvalue of largest real part of a straight rod along x that is spun at its clamp, its twist at rest."""
     simulation = Simulation(case)
-    mechanics, fluid, state = simulation.mechanics, simulation.fluid, simulation.state_now
+    system, fluid, state = simulation.system, simulation.fluid, simulation.state_now
     radius = case.parameters["b"]
     for _ in range(60):  # the twist settles in zeta_r L^2/(C pi^2/4)
-        state = Implicit(1).step(mechanics, fluid, state, 2 * np.pi * radius**2).state
-    shape, time, n = state.shape, state.time, len(simulation.arclength)
-    held = Held(mechanics.ends.index, mechanics.ends.motion(0.0, 1.0))
+        state = Implicit(1).step(system, fluid, state, 2 * np.pi * radius**2).state
+    shape, time, n = state.configuration, state.time, len(simulation.arclength)
+    held = Prescribed(system.ends.index, system.ends.motion(0.0, 1.0))
 
     def velocity(y: np.ndarray) -> np.ndarray:
-        moved = mechanics.move(shape, y)
-        force, _ = mechanics.forces(moved, time)
+        moved = system.move(shape, y)
+        force, _ = system.forces(moved, time)
         response = fluid.response(moved.r, moved.e3, time, 1.0)
         return response.forced(force, held, np.zeros((n, 4))).move.ravel()
 

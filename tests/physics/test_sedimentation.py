@@ -49,7 +49,7 @@ def test_a_rod_sinks_as_a_cylinder_of_the_line_radius_whose_ends_reach_a_radius_
     direction = ["filament.rod.direction=[0, 0, 1]", "filament.rod.normal=[1, 0, 0]"] if along else []
     simulation = Simulation(parse_case(SCENE, "rod.toml", direction))
     simulation.advance(0.02, lambda: None)
-    velocity = simulation.frame().filaments["rod"].velocity
+    velocity = simulation.snapshot().filaments["rod"].velocity
     s = simulation.arclength
     found = -np.trapezoid(velocity[:, 2], s)
     radius = KERNELS["peskin4"].line_radius * BOX / CELLS

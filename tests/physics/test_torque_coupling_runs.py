@@ -15,7 +15,7 @@ from ibfil.check.report import report
 from ibfil.check.warnings import warnings
 from ibfil.grid.kernels import PESKIN4
 from ibfil.observables.factory import observers
-from ibfil.rods.geometry import Geometry
+from ibfil.rods.geometry import Configuration
 from ibfil.simulation.simulation import Simulation
 
 STIRRED: dict[str, Any] = {**STOKES, "rotation": "grid"}
@@ -29,8 +29,8 @@ def twisting(**time: Any) -> Case:
 
 
 @cache
-def reference() -> Geometry:
-    return run(twisting(end=0.4, step=0.4 / 1280)).shape
+def reference() -> Configuration:
+    return run(twisting(end=0.4, step=0.4 / 1280)).configuration
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def reference() -> Geometry:
 )
 def test_positions_and_frame_converge_at_the_order_of_the_scheme(scheme, order):
     exact = reference()
-    shapes = [run(twisting(end=0.4, step=0.4 / n, scheme=scheme, order=order)).shape for n in (80, 160, 320)]
+    shapes = [run(twisting(end=0.4, step=0.4 / n, scheme=scheme, order=order)).configuration for n in (80, 160, 320)]
     for errors in ([rms(g.r - exact.r) for g in shapes], [rms(g.e1 - exact.e1) for g in shapes]):
         assert np.all(slopes(errors) > 0.9 * order)
         assert np.all(slopes(errors) < order + 0.5)
@@ -46,8 +46,8 @@ def test_positions_and_frame_converge_at_the_order_of_the_scheme(scheme, order):
 
 def test_the_explicit_scheme_finds_the_same_path():
     soft: dict[str, Any] = {"stretching": 50.0, "rod": {"nodes": 9, "radius": "L/10"}, "end": 0.15}
-    exact = run(twisting_rod(STIRRED, step=0.15 / 400, **soft)).shape
-    shapes = [run(twisting_rod(STIRRED, step=0.15 / n, scheme="explicit", **soft)).shape for n in (400, 800)]
+    exact = run(twisting_rod(STIRRED, step=0.15 / 400, **soft)).configuration
+    shapes = [run(twisting_rod(STIRRED, step=0.15 / n, scheme="explicit", **soft)).configuration for n in (400, 800)]
     for errors in ([rms(g.r - exact.r) for g in shapes], [rms(g.e1 - exact.e1) for g in shapes]):
         assert 0.9 < slopes(errors)[0] < 1.5
 
@@ -58,7 +58,7 @@ GRID: dict[str, Any] = {"model": "stokes", "box": [1.6, 2.0, 2.4], "cells": [16,
 @pytest.mark.parametrize(("method", "tolerance"), [("fft", 1e-10), ("krylov", 1e-6)])
 def test_a_run_by_ffts_is_the_run_by_the_table(method, tolerance):
     table, other = (
-        run(scene({"rod": RIBBON}, {**GRID, "method": m}, end=0.4, step=0.02)).shape for m in ("table", method)
+        run(scene({"rod": RIBBON}, {**GRID, "method": m}, end=0.4, step=0.02)).configuration for m in ("table", method)
     )
     assert np.abs(table.r - other.r).max() < tolerance
     assert np.abs(table.e1 - other.e1).max() < tolerance
@@ -70,7 +70,7 @@ def test_turning_the_box_with_the_rod_in_it_turns_the_motion():
         fluid = {**GRID, **{key: np.roll(GRID[key], turn).tolist() for key in ("box", "cells")}}
         place = {"position": [0.13, -0.21, 0.34], "direction": [0.6, 0.8, 0.0], "normal": [0.0, 0.0, 1.0]}
         rod = {**RIBBON, **{key: np.roll(value, turn).tolist() for key, value in place.items()}}
-        shapes.append(run(scene({"rod": rod}, fluid, end=0.4, step=0.02)).shape)
+        shapes.append(run(scene({"rod": rod}, fluid, end=0.4, step=0.02)).configuration)
     for turn, shape in enumerate(shapes):
         assert np.abs(np.roll(shape.r, -turn, axis=1) - shapes[0].r).max() < 1e-12
         assert np.abs(np.roll(shape.e1, -turn, axis=1) - shapes[0].e1).max() < 1e-12
@@ -86,19 +86,19 @@ def test_a_cut_run_goes_on_bit_for_bit(method, time):
     whole_in_two.advance(0.2, lambda: None)
     again.restore(cut.state())
     again.advance(0.2, lambda: None)
-    assert np.array_equal(again.shape.r, whole_in_two.shape.r)
-    assert np.array_equal(again.shape.e1, whole_in_two.shape.e1)
-    assert rms(again.shape.r - whole.shape.r) < 1e-3
+    assert np.array_equal(again.configuration.r, whole_in_two.configuration.r)
+    assert np.array_equal(again.configuration.e1, whole_in_two.configuration.e1)
+    assert rms(again.configuration.r - whole.configuration.r) < 1e-3
 
 
 def test_copies_of_a_spinning_rod_by_krylov_are_those_by_the_table():
     rod = {**RIBBON, "copies": {"count": 4, "seed": 3, "region": [[-0.6, -0.8, -1.0], [0.6, 0.8, 1.0]]}}
-    frames = [
-        run(scene({"rod": rod}, {**GRID, "method": m}, end=0.06, step=0.02)).frame().filaments
+    snapshots = [
+        run(scene({"rod": rod}, {**GRID, "method": m}, end=0.06, step=0.02)).snapshot().filaments
         for m in ("table", "krylov")
     ]
-    for name, one in frames[0].items():
-        assert np.abs(one.position - frames[1][name].position).max() < 1e-6
+    for name, one in snapshots[0].items():
+        assert np.abs(one.position - snapshots[1][name].position).max() < 1e-6
 
 
 # --- what it means ---------------------------------------------------------------------------------------------------
@@ -123,10 +123,10 @@ def test_a_flow_that_turns_as_a_whole_turns_a_free_rod_and_its_frame_with_it():
         c, s = np.cos(0.4), np.sin(0.4)
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]] if axis == "along" else [[1, 0, 0], [0, c, -s], [0, s, c]])
         start = simulation.start
-        settled = run(scene({"rod": rod}, STIRRED, end=0.2, step=0.002)).shape  # the polygon settles by itself
+        settled = run(scene({"rod": rod}, STIRRED, end=0.2, step=0.002)).configuration  # the polygon settles by itself
         assert rms(settled.r - start.r) < 1e-3
-        assert simulation.shape.r == pytest.approx(settled.r @ turn.T, abs=1e-5), axis
-        assert simulation.shape.e1 == pytest.approx(settled.e1 @ turn.T, abs=1e-5), axis
+        assert simulation.configuration.r == pytest.approx(settled.r @ turn.T, abs=1e-5), axis
+        assert simulation.configuration.e1 == pytest.approx(settled.e1 @ turn.T, abs=1e-5), axis
 
 
 def spun(radius: float, fluid: dict[str, Any] | None = None, **more: Any) -> Simulation:
@@ -136,7 +136,7 @@ def spun(radius: float, fluid: dict[str, Any] | None = None, **more: Any) -> Sim
 
 
 def torque(simulation: Simulation) -> float:
-    return float(simulation.frame().diagnostics["net_torque"][2])
+    return float(simulation.snapshot().diagnostics["net_torque"][2])
 
 
 def test_a_thin_rod_spins_against_its_own_drag():
@@ -159,7 +159,7 @@ def test_torques_of_a_thick_rod_do_not_lock():
     """Uniform spin asks for uniform torque; without the spin's slip its nodes answer with +-20 times that."""
     for slip, smooth in ((0.01, True), (0.0, False)):
         simulation = spun(PESKIN4.twist_radius * 2.0 / 32, {"slip": slip}, length=1.0, nodes=17)
-        torque = simulation.frame().filaments["rod"].torque[:, 2] * 16
+        torque = simulation.snapshot().filaments["rod"].torque[:, 2] * 16
         middle = torque[4:-4] / (4 * np.pi * SPUN**2)
         assert np.abs(middle - 1).max() < 0.2 if smooth else np.abs(middle - 1).max() > 2
         assert any("lock" in warning for warning in warnings(simulation)) != smooth
@@ -192,7 +192,7 @@ def test_a_spinning_rod_stirs_the_fluid_around_it_and_only_with_rotation_grid():
     for rotation in ("local", "grid"):
         case = scene({"rod": rod}, {**STOKES, "rotation": rotation}, end=0.2, step=0.02)
         simulation = run(case)
-        shape, force = simulation.shape, simulation.state()["force"]
+        shape, force = simulation.configuration, simulation.state()["force"]
         found[rotation] = simulation.fluid.velocity_at(np.array(points), shape.r, shape.e3, force, 0.2)
     assert np.abs(found["local"]).max() < 1e-12
     for u, (x, y, _) in zip(found["grid"], points, strict=True):
@@ -209,7 +209,7 @@ def test_a_filament_that_does_not_twist_is_carried_and_gives_no_torque():
     simulation = run(scene({"spinner": spinner, "still": still}, STIRRED, end=0.1, step=0.02))
     force = simulation.state()["force"]
     assert np.abs(force[16:, 3]).max() < 1e-14 * np.abs(force[:16, 3]).max()
-    move = simulation.shape.r[16:] - simulation.start.r[16:]
+    move = simulation.configuration.r[16:] - simulation.start.r[16:]
     assert move[:, 1].mean() > 0.05 * 0.1 * SPUN**2 / 0.2  # around the spinner, which turns about z
 
 
@@ -221,34 +221,34 @@ def test_methods_that_know_no_torques_are_refused_and_never_chosen():
 def test_frames_hold_the_torque_and_the_spin_and_their_power():
     """All of a spun straight rod's power is its torque's; so is the diagnostic, and the observables count it."""
     simulation = spun(0.3 * SPUN)
-    frame = simulation.frame()
-    rod = frame.filaments["rod"]
-    assert rod.torque.sum(axis=0) == pytest.approx(frame.diagnostics["net_torque"], abs=1e-12)
+    snapshot = simulation.snapshot()
+    rod = snapshot.filaments["rod"]
+    assert rod.torque.sum(axis=0) == pytest.approx(snapshot.diagnostics["net_torque"], abs=1e-12)
     assert rod.spin == pytest.approx(np.tile([0, 0, 1.0], (16, 1)), abs=1e-9)
     assert rod.power.sum() == pytest.approx(rod.torque[:, 2].sum(), rel=1e-9)
-    assert rod.power.sum() == pytest.approx(frame.diagnostics["power"], rel=1e-12)
+    assert rod.power.sum() == pytest.approx(snapshot.diagnostics["power"], rel=1e-12)
     text = simulation.case.text + "".join(f'\n[observe.{k}]\nkind = "{k}"\n' for k in ("torque", "power"))
     looking = observers(parse_case(text, "spun.toml"))
-    looking.take(frame)
+    looking.record(snapshot)
     observed = {k: looking.summaries()[k].value for k in ("torque", "power")}
-    assert observed["torque"] == pytest.approx(frame.diagnostics["net_torque"], abs=1e-12)
-    assert observed["power"] == pytest.approx(frame.diagnostics["power"], rel=1e-12)
+    assert observed["torque"] == pytest.approx(snapshot.diagnostics["net_torque"], abs=1e-12)
+    assert observed["power"] == pytest.approx(snapshot.diagnostics["power"], rel=1e-12)
 
 
 def test_a_free_rod_gives_the_fluid_neither_force_nor_torque():
     """Forces and twist torques together, as the grid feels them, with forces that are free of torque."""
     rod = {**RIBBON, "force": "torque-free", "derivative": 2, "start": {"end": "free"}}
-    frame = run(scene({"rod": rod}, GRID, end=0.1, step=0.02)).frame()
-    felt = frame.filaments["rod"]
-    assert np.abs(frame.diagnostics["net_force"]).max() < 1e-11 * np.abs(felt.force).sum()
+    snapshot = run(scene({"rod": rod}, GRID, end=0.1, step=0.02)).snapshot()
+    felt = snapshot.filaments["rod"]
+    assert np.abs(snapshot.diagnostics["net_force"]).max() < 1e-11 * np.abs(felt.force).sum()
     own = np.abs(np.cross(felt.position, felt.force)).sum()
     assert np.abs(felt.torque).sum() > 0.01 * own
-    assert np.abs(frame.diagnostics["net_torque"]).max() < 1e-7 * own  # Newton's tolerance
+    assert np.abs(snapshot.diagnostics["net_torque"]).max() < 1e-7 * own  # Newton's tolerance
 
 
 def test_a_table_in_single_precision_is_one_to_its_digits():
     paths = [
-        run(scene({"rod": RIBBON}, {**GRID, "method": "table", "precision": p}, end=0.2, step=0.02)).shape
+        run(scene({"rod": RIBBON}, {**GRID, "method": "table", "precision": p}, end=0.2, step=0.02)).configuration
         for p in ("double", "single")
     ]
     assert 0 < np.abs(paths[0].r - paths[1].r).max() < 1e-4

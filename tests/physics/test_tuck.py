@@ -19,11 +19,11 @@ import pytest
 
 from ibfil.case.reading import read_case
 from ibfil.fluids.immersed_boundary import Immersed
-from ibfil.fluids.navier_stokes import NavierStokes, Room
+from ibfil.fluids.navier_stokes import NavierStokes, Workspace
 from ibfil.fluids.stokes import StokesByTable
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation.simulation import Simulation
 
 CASE = Path(__file__).parents[1] / "cases/inertia/pumping_sheets.toml"
@@ -36,8 +36,8 @@ def pumped(reynolds: float, cells: int, periods: int, steps: int) -> float:
     h = 2 * np.pi / cells
     grid = Grid([2 * np.pi, 2 * np.pi * TALL, h], shape)
     made = Immersed(grid, KERNELS["peskin4"], 1.0, np.zeros(cells), None)
-    room = Room(grid)
-    fluid = NavierStokes(made, reynolds, lambda alpha: StokesByTable(made, alpha), room)
+    workspace = Workspace(grid)
+    fluid = NavierStokes(made, reynolds, lambda alpha: StokesByTable(made, alpha), workspace)
     s, zero = h * np.arange(cells), np.zeros((cells, 3))
     dt, forces, speeds = 2 * np.pi / steps, [], []
     for m in range(1, steps * periods + 1):
@@ -45,11 +45,11 @@ def pumped(reynolds: float, cells: int, periods: int, steps: int) -> float:
         tau = dt * (1 + w) / (1 + 2 * w)
         moves = tau * np.stack([0 * s, -AMPLITUDE * np.cos(s - t), 0 * s], axis=1)
         response = fluid.response(np.stack([s, AMPLITUDE * np.sin(s - t), 0 * s], axis=1), zero, t, tau, w)
-        answer = response.forced(zero, Held(np.arange(3 * cells), moves.ravel()), zero)
+        answer = response.forced(zero, Prescribed(np.arange(3 * cells), moves.ravel()), zero)
         fluid.advance(response, answer.force)
         if m > steps * (periods - 1):
             forces.append(answer.force[:, 0].sum())
-            u = np.fft.irfftn(fluid.past.now, shape, axes=(1, 2, 3)) * np.prod(shape)
+            u = np.fft.irfftn(fluid.history.now, shape, axes=(1, 2, 3)) * np.prod(shape)
             speeds.append(u[0, :, 0].mean())  # half way between the sheets
     height = 2 * np.pi * TALL
     back = np.mean(forces) * height**2 / (8 * np.prod(grid.box))
@@ -86,13 +86,13 @@ def test_the_shipped_sheets_push_as_tuck_says(reynolds, periods):
     def speed(cells):
         end, h = 2 * np.pi * periods, 2 * np.pi / cells
         case = read_case(CASE, [f"parameters.n={cells}", f"parameters.R={reynolds}", f"time.end={end}"])
-        simulation, pushes = Simulation(case), []
+        simulation, load_rates = Simulation(case), []
         simulation.advance(end - 2 * np.pi, lambda: None)
         for k in range(1, 65):
             simulation.advance(end - 2 * np.pi * (1 - k / 64), lambda: None)
-            frame = simulation.frame().filaments["to_right"]
-            pushes.append(frame.force[:, 0].sum())
-        return float(np.mean(pushes)) / (8 * h)
+            snapshot = simulation.snapshot().filaments["to_right"]
+            load_rates.append(snapshot.force[:, 0].sum())
+        return float(np.mean(load_rates)) / (8 * h)
 
     taylor = 0.5 * AMPLITUDE**2
     assert 2 * speed(64) - speed(32) == pytest.approx(taylor * tuck(reynolds), rel=0.03)

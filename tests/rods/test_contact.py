@@ -32,14 +32,14 @@ def test_stop_ends_the_run_at_the_first_contact_and_says_where():
     assert {match[1], match[3]} == {"upper", "lower"}
     assert {match[2], match[4]} <= {"5", "6"}  # they cross between these
     assert float(match[5]) == pytest.approx(0.18)  # the first step's end after it
-    assert result.frame.time == result.times[-1] == pytest.approx(0.18)
+    assert result.snapshot.time == result.times[-1] == pytest.approx(0.18)
     assert result.times == pytest.approx([0, 0.1, 0.18])
-    assert result.frame.diagnostics["contacts"] == 1
+    assert result.snapshot.diagnostics["contacts"] == 1
 
 
 def test_a_run_that_never_touches_finishes():
     result, _ = ran(case(crossed(0.4, 4 * np.pi), {"distance": 0.05}, end=0.17))
-    assert (result.status, result.frame.diagnostics["contacts"]) == ("finished", 0)
+    assert (result.status, result.snapshot.diagnostics["contacts"]) == ("finished", 0)
 
 
 def test_rods_that_touch_to_begin_with_stop_at_once():
@@ -56,11 +56,11 @@ def test_no_step_is_so_long_that_a_contact_slips_through():
     """In one step of 0.1 each rod moves by two distances, and the rods change sides."""
     scene = case(crossed(0.29, 4 * np.pi), {"distance": 0.05}, step=0.1, every=0.2, end=0.2)
     result, _ = ran(scene)
-    z = [frame.position[:, 2] for frame in result.frame.filaments.values()]
+    z = [snapshot.position[:, 2] for snapshot in result.snapshot.filaments.values()]
     assert np.max(z[0]) < np.min(z[1])
     assert result.reason.startswith("contact between")
     assert 0.1 < float(result.reason.split("= ")[1]) < 0.15
-    assert result.frame.time == pytest.approx(0.2)
+    assert result.snapshot.time == pytest.approx(0.2)
 
 
 def test_stop_is_written_into_the_run_file(tmp_path):
@@ -79,9 +79,9 @@ def test_warn_tells_the_first_contact_once_and_goes_on():
     assert told == [line for line in told if line.startswith("warning: contact between")]
     assert len(told) == 1
     assert told[0].endswith("at t = 0.18")
-    assert (result.status, result.frame.time) == ("finished", 0.3)
-    assert result.frame.diagnostics["first_contact"] == pytest.approx(0.18)
-    assert result.frame.diagnostics["contacts"] == 0  # they have gone through each other, as said
+    assert (result.status, result.snapshot.time) == ("finished", 0.3)
+    assert result.snapshot.diagnostics["first_contact"] == pytest.approx(0.18)
+    assert result.snapshot.diagnostics["contacts"] == 0  # they have gone through each other, as said
 
 
 def test_warn_has_its_time_and_its_counts_in_the_run_file(tmp_path):
@@ -105,14 +105,14 @@ def test_a_first_contact_is_remembered_by_a_run_that_goes_on():
     other.advance(0.3, lambda: None)
     assert len(one.notices) == 1
     assert other.notices == []
-    assert other.frame().diagnostics["first_contact"] == one.frame().diagnostics["first_contact"]
+    assert other.snapshot().diagnostics["first_contact"] == one.snapshot().diagnostics["first_contact"]
 
 
 def test_the_distance_is_the_sum_of_radii_where_none_is_given():
     thick, thin = {"radius": 0.06}, {"radius": "0.01 + 0*s"}
     rods = crossed(0.4, 4 * np.pi)
     result, _ = ran(case({"upper": {**rods["upper"], **thick}, "lower": {**rods["lower"], **thin}}, {}))
-    assert result.frame.time == pytest.approx(0.17)  # (0.4 - 0.07)/2 = 0.165
+    assert result.snapshot.time == pytest.approx(0.17)  # (0.4 - 0.07)/2 = 0.165
     with pytest.raises(CaseError, match=r"contact\.distance: .*no filament\.lower\.radius"):
         case({"upper": {**rods["upper"], **thick}, "lower": rods["lower"]}, {})
 
@@ -138,7 +138,7 @@ def test_images_touch_where_the_fluid_is_a_box():
     """Rods near two opposite faces of the box, drawn out of it: 0.2 apart through the faces, 0.8 within."""
     rods = crossed(0.8, -4 * np.pi)
     result, _ = ran(case(rods, {"distance": 0.05}, GRID, every=0.02, step=0.005))
-    upper, lower = (rod.position[5:7, 2].mean() for rod in result.frame.filaments.values())
+    upper, lower = (rod.position[5:7, 2].mean() for rod in result.snapshot.filaments.values())
     assert result.status == "stopped"
     assert 0.95 < upper - lower < 0.96  # a step moves them by 0.01
     assert ran(case(rods, {"distance": 0.05}, end=0.2))[0].status == "finished"  # no box, no images
@@ -180,7 +180,7 @@ def test_nothing_of_contact_is_loaded_without_it(tmp_path, contact, loaded):
 def test_without_it_there_is_nothing_of_it_in_the_results():
     simulation = Simulation(case(crossed(0.01, 0.0), None))
     assert isinstance(simulation.rods.contact, NoContact)
-    assert not {"contacts", "first_contact"} & set(simulation.frame().diagnostics)
+    assert not {"contacts", "first_contact"} & set(simulation.snapshot().diagnostics)
     assert "first_contact" not in simulation.state()
     assert not any("contact" in line for line in warnings(simulation))
 

@@ -8,7 +8,7 @@ from helpers.scenes import RFT, STOKES, run, scene, slopes
 from scipy.spatial.transform import Rotation
 
 from ibfil.rods.base import TangentReversed
-from ibfil.rods.frame import carry
+from ibfil.rods.frame import transport
 from ibfil.simulation.simulation import Simulation
 
 X, Y, Z = np.eye(3)
@@ -31,7 +31,7 @@ def frames(n: int, largest: float, seed: int = 0) -> tuple[np.ndarray, np.ndarra
 
 def test_carried_directors_are_unit_and_normal_to_the_new_tangent() -> None:
     e1, old, new, _ = frames(200, 3.0)
-    out, _ = carry(e1, old, new, np.random.default_rng(1).uniform(-3.0, 3.0, 200))
+    out, _ = transport(e1, old, new, np.random.default_rng(1).uniform(-3.0, 3.0, 200))
     assert np.linalg.norm(out, axis=1) == pytest.approx(np.ones(200), abs=1e-14)
     assert np.abs(np.sum(out * new, axis=1)).max() < 1e-14
 
@@ -40,7 +40,7 @@ def test_carrying_is_the_smallest_rotation_that_takes_the_old_tangent_to_the_new
     e1, old, new, turned = frames(200, 3.0)
     axis = unit(np.cross(old, new))
     expected = Rotation.from_rotvec(turned[:, None] * axis).apply(e1)
-    out, _ = carry(e1, old, new, np.zeros(200))
+    out, _ = transport(e1, old, new, np.zeros(200))
     # Eq. 41 divides by 1 + old.new, about 0.01 at 3 radians: two digits of sixteen are lost.
     assert np.abs(out - expected).max() < 1e-13
 
@@ -48,16 +48,16 @@ def test_carrying_is_the_smallest_rotation_that_takes_the_old_tangent_to_the_new
 def test_turning_is_the_rotation_about_the_new_tangent_by_the_angle_itself() -> None:
     e1, old, new, _ = frames(200, 2.0)
     angle = np.random.default_rng(2).uniform(-np.pi, np.pi, 200)
-    carried, _ = carry(e1, old, new, np.zeros(200))
-    turned, _ = carry(e1, old, new, angle)
-    assert np.abs(turned - Rotation.from_rotvec(angle[:, None] * new).apply(carried)).max() < 1e-14
+    transported, _ = transport(e1, old, new, np.zeros(200))
+    turned, _ = transport(e1, old, new, angle)
+    assert np.abs(turned - Rotation.from_rotvec(angle[:, None] * new).apply(transported)).max() < 1e-14
 
 
 def test_round_off_does_not_build_up_over_many_steps() -> None:
     e1, old, _, _ = frames(1, 1.0)
     for k in range(20000):
         new = unit(old + 0.01 * np.array([[np.sin(k), np.cos(2 * k), np.sin(3 * k)]]))
-        e1, _ = carry(e1, old, new, np.full(1, 0.1))
+        e1, _ = transport(e1, old, new, np.full(1, 0.1))
         old = new
     assert abs(np.linalg.norm(e1) - 1) < 1e-15
     assert abs(np.sum(e1 * old)) < 1e-15
@@ -73,7 +73,7 @@ def test_carried_round_a_circle_the_director_turns_by_the_solid_angle_to_second_
         start = np.array([[np.cos(c), 0.0, -np.sin(c)]])
         e1 = start
         for k in range(steps):
-            e1, _ = carry(e1, e3[k : k + 1], e3[k + 1 : k + 2], np.zeros(1))
+            e1, _ = transport(e1, e3[k : k + 1], e3[k + 1 : k + 2], np.zeros(1))
         e2 = np.cross(e3[0], start[0])
         turned = np.arctan2(e1[0] @ e2, e1[0] @ start[0])
         return abs((turned - 2 * np.pi * (1 - np.cos(c)) + np.pi) % (2 * np.pi) - np.pi)
@@ -83,7 +83,7 @@ def test_carried_round_a_circle_the_director_turns_by_the_solid_angle_to_second_
 
 def test_the_smallest_one_plus_cosine_is_told_so_that_reversals_are_noticed() -> None:
     e1, old, new, turned = frames(50, 3.0)
-    _, least = carry(e1, old, new, np.zeros(50))
+    _, least = transport(e1, old, new, np.zeros(50))
     assert least == pytest.approx(1 + np.cos(turned.max()), rel=1e-10)
 
 
@@ -93,7 +93,7 @@ def test_a_tangent_that_reverses_within_a_step_is_refused_with_its_node() -> Non
     back = np.zeros((9, 3))
     back[8, 0] = -1.5 / 8  # the last node to half a segment behind the one before it
     with pytest.raises(TangentReversed) as caught:
-        rods.mechanics.move(rods.shape, back)
+        rods.system.move(rods.configuration, back)
     assert caught.value.node == 8
 
 
@@ -101,15 +101,15 @@ def test_a_rod_may_turn_by_up_to_168_degrees_within_a_step() -> None:
     """1 + cos of it is 0.022, of 169 degrees 0.018; at 0.02 Eq. 41 magnifies rounding by sqrt(2/0.02) = 10."""
     rod = {"length": 1.0, "nodes": 9, "derivative": 2, "bending": 1.0, "stretching": 100.0}
     rods = Simulation(scene({"rod": rod}))
-    straight = rods.shape.r
+    straight = rods.configuration.r
 
     def turned(degrees: float) -> np.ndarray:
         return Rotation.from_euler("z", degrees, degrees=True).apply(straight)
 
-    there = rods.mechanics.move(rods.shape, turned(168) - straight)
+    there = rods.system.move(rods.configuration, turned(168) - straight)
     assert there.e3 == pytest.approx(np.tile(turned(168)[-1] / 0.5, (9, 1)), abs=1e-13)
     with pytest.raises(TangentReversed, match=r"0\.018 \(allowed 0\.02\)"):
-        rods.mechanics.move(rods.shape, turned(169) - straight)
+        rods.system.move(rods.configuration, turned(169) - straight)
 
 
 # A clamp that turns. C and the drag are such that nothing but the clamp matters: e1 there is prescribed.
@@ -138,8 +138,8 @@ def test_a_spun_clamp_holds_e1_at_cos_wt_y_plus_sin_wt_z(scheme: str, fluid: dic
     w = 5.0
     simulation = spun({"spin": w}, scheme=scheme, fluid=fluid, at=at)
     t = simulation.time
-    assert simulation.shape.e1[node] == pytest.approx(np.cos(w * t) * Y + np.sin(w * t) * Z, abs=1e-14)
-    assert np.array_equal(simulation.shape.r[node], Simulation(simulation.case).shape.r[node])
+    assert simulation.configuration.e1[node] == pytest.approx(np.cos(w * t) * Y + np.sin(w * t) * Z, abs=1e-14)
+    assert np.array_equal(simulation.configuration.r[node], Simulation(simulation.case).configuration.r[node])
 
 
 @pytest.mark.parametrize("fluid", [RFT, STOKES], ids=["rft", "stokes"])
@@ -148,7 +148,7 @@ def test_a_spun_clamp_gives_the_fluid_the_torque_of_its_own_drag(fluid: dict, at
     """4 pi eta a^2 w over half a segment, by BDF2 in steps of any length."""
     simulation = spun({"spin": 5.0}, fluid=fluid, at=at)
     simulation.advance(0.36, lambda: None)
-    torque = simulation.frame().filaments["rod"].torque[node]
+    torque = simulation.snapshot().filaments["rod"].torque[node]
     assert torque == pytest.approx(4 * np.pi * 0.05**2 * 5.0 / 16 * X, rel=1e-9)
 
 
@@ -167,10 +167,10 @@ def test_a_spin_that_varies_is_integrated_exactly_over_long_steps(end, angle, at
     simulation = spun(end, at=at)
     turned = angle(simulation.time)
     node = 0 if at == "start" else -1
-    assert simulation.shape.e1[node] == pytest.approx(np.cos(turned) * Y + np.sin(turned) * Z, abs=1e-13)
+    assert simulation.configuration.e1[node] == pytest.approx(np.cos(turned) * Y + np.sin(turned) * Z, abs=1e-13)
 
 
 def test_a_clamp_that_leaves_twist_free_does_not_hold_e1() -> None:
     simulation = spun({"twist": "free"})
-    assert 3 not in simulation.mechanics.ends.index
-    assert list(simulation.mechanics.ends.index) == [0, 1, 2]
+    assert 3 not in simulation.system.ends.index
+    assert list(simulation.system.ends.index) == [0, 1, 2]

@@ -11,12 +11,12 @@ from ibfil.linalg import banded
 from ibfil.rods.constitutive import Linear, gather
 from ibfil.rods.elastic_force import Moment, nodal_force
 from ibfil.rods.mesh import Segmented, stack
-from ibfil.rods.system import Mechanics
+from ibfil.rods.system import RodSystem
 from ibfil.rods.torque_free import TorqueFree
 
 S = np.linspace(0.0, 1.0, 15) ** 1.2
 TANGENT = np.array([1.0, 0.2, 0.1]) / np.linalg.norm([1.0, 0.2, 0.1])
-KINDS = pytest.mark.parametrize("kind", [Mechanics, TorqueFree], ids=["eq44", "torque-free"])
+KINDS = pytest.mark.parametrize("kind", [RodSystem, TorqueFree], ids=["eq44", "torque-free"])
 
 
 def preferred(s: np.ndarray) -> np.ndarray:
@@ -67,7 +67,7 @@ def test_the_forces_sum_to_zero_for_any_moment_and_any_shape(derivative: int, cl
 @pytest.mark.parametrize("nodes", [9, 17])
 @pytest.mark.parametrize("stretch", [1.03, 0.97])
 def test_a_stretched_rod_pulls_its_ends_in_by_the_stiffness_times_the_strain(
-    kind: type[Mechanics], nodes: int, stretch: float
+    kind: type[RodSystem], nodes: int, stretch: float
 ) -> None:
     """Eq. 20, corrected: the spring force is EA (|d|/ds - 1) along d, at every spacing."""
     rods = bare([Segmented(np.linspace(0.0, 2.0, nodes), 6, None, None)], kind=kind, stretching=80.0)
@@ -82,7 +82,7 @@ def test_a_stretched_rod_pulls_its_ends_in_by_the_stiffness_times_the_strain(
 
 @KINDS
 @pytest.mark.parametrize("derivative", [2, 6])
-def test_a_rod_in_pure_bending_bears_no_force(kind: type[Mechanics], derivative: int) -> None:
+def test_a_rod_in_pure_bending_bears_no_force(kind: type[RodSystem], derivative: int) -> None:
     """On an arc of curvature k, Q' = A k^2 e3 along the rod; P = A k^2 in the tension takes it away."""
     left = []
     for nodes in (17, 33, 65):
@@ -99,7 +99,7 @@ def test_a_rod_in_pure_bending_bears_no_force(kind: type[Mechanics], derivative:
 
 @KINDS
 @pytest.mark.parametrize("clamped", [False, True], ids=["free", "clamped"])
-def test_moments_and_twist_sources_vanish_at_free_ends_and_only_there(kind: type[Mechanics], clamped: bool) -> None:
+def test_moments_and_twist_sources_vanish_at_free_ends_and_only_there(kind: type[RodSystem], clamped: bool) -> None:
     rods = bare(pair(clamped, 6), kind=kind, strains=preferred)
     shape = rods.start(wild(len(S)), directors(2 * len(S)))
     moment = rods.moment(shape, 0.0)
@@ -113,7 +113,7 @@ def test_moments_and_twist_sources_vanish_at_free_ends_and_only_there(kind: type
 
 
 @KINDS
-def test_moving_one_filament_leaves_the_force_on_another_as_it_is(kind: type[Mechanics]) -> None:
+def test_moving_one_filament_leaves_the_force_on_another_as_it_is(kind: type[RodSystem]) -> None:
     rods = bare(pair(True, 6), kind=kind, strains=preferred)
     n = len(S)
     r, e1 = wild(n), directors(2 * n)
@@ -133,7 +133,7 @@ def test_moving_one_filament_leaves_the_force_on_another_as_it_is(kind: type[Mec
 @pytest.mark.parametrize("clamped", [False, True], ids=["free", "clamped"])
 @pytest.mark.parametrize("displaced", [False, True], ids=["at the start", "displaced"])
 def test_the_stiffness_is_the_jacobian_of_the_forces(
-    kind: type[Mechanics], m: int, derivative: int, clamped: bool, displaced: bool
+    kind: type[RodSystem], m: int, derivative: int, clamped: bool, displaced: bool
 ) -> None:
     """In 3-D, A1 != A2, twisted, stretched, uneven spacing, preferred strains.
 
@@ -154,7 +154,7 @@ def test_the_stiffness_is_the_jacobian_of_the_forces(
 
 @KINDS
 @pytest.mark.parametrize("clamped", [False, True], ids=["free", "clamped"])
-def test_follower_forces_take_part_in_the_jacobian(kind: type[Mechanics], clamped: bool) -> None:
+def test_follower_forces_take_part_in_the_jacobian(kind: type[RodSystem], clamped: bool) -> None:
     n = len(S)
     rods = bare(pair(clamped, 6), kind=kind, strains=preferred, followers={0: 20.0, n - 1: -30.0, n: 7.0})
     start = rods.start(wild(n), directors(2 * n))
@@ -175,7 +175,7 @@ def test_without_twist_the_stiffness_is_the_same_block() -> None:
 
 @KINDS
 @pytest.mark.parametrize("m", [3, 4])
-def test_the_definite_stiffness_leaves_out_the_compression_and_nothing_else(kind: type[Mechanics], m: int) -> None:
+def test_the_definite_stiffness_leaves_out_the_compression_and_nothing_else(kind: type[RodSystem], m: int) -> None:
     """The difference of the two matrices is F'3/ds 1 on the segments where F'3 < 0."""
     rods = bare(pair(True, 6), kind=kind, unknowns=m, strains=preferred)
     shape = rods.start(wild(len(S)), directors(2 * len(S)))

@@ -14,9 +14,9 @@ from ibfil.assembly.fluids.models import fluid_model
 from ibfil.case.schema import Case
 from ibfil.fluids import resistive_force
 from ibfil.linalg import banded
-from ibfil.linalg.constraints import Held
+from ibfil.linalg.constraints import Prescribed
 from ibfil.rods import mesh
-from ibfil.rods.boundary_conditions import HeldEnd, HeldEnds, spinning, steady, turned
+from ibfil.rods.boundary_conditions import PrescribedEnd, PrescribedEnds, spinning, steady, turned
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping import base as timestepping_base
 from ibfil.timestepping import explicit, implicit, semi_implicit
@@ -62,7 +62,7 @@ SCHEMES = {
 )
 def test_positions_of_hinged_and_clamped_ends_are_held_and_e1_at_clamps_that_hold_it(keys, held) -> None:
     simulation = Simulation(scene({"rod": {**ROD, **keys}}))
-    assert sorted(simulation.mechanics.ends.index) == held
+    assert sorted(simulation.system.ends.index) == held
 
 
 @pytest.mark.parametrize("keys", [{}, TWIST], ids=["planar", "twisting"])
@@ -72,7 +72,7 @@ def test_only_clamps_carry_a_moment(keys) -> None:
     for start, finish in ((CLAMPED, {}), (HINGED, CLAMPED), ({}, HINGED)):
         rod = {**ROD, **keys, "shape": arc, "start": start, "finish": finish}
         simulation = Simulation(scene({"rod": rod}))
-        moment = simulation.mechanics.moment(simulation.shape, 0.0).bend
+        moment = simulation.system.moment(simulation.configuration, 0.0).bend
         assert [bool(np.any(moment[i])) for i in (0, -1)] == [start == CLAMPED, finish == CLAMPED]
 
 
@@ -80,15 +80,17 @@ def test_prescribed_motion_is_turn_and_displacement_between_two_times() -> None:
     def place(t: float) -> np.ndarray:
         return np.array([t, t**2, 0.0])
 
-    ends = HeldEnds([HeldEnd(0, steady(2.0)), HeldEnd(5, turned(lambda t: t**3), place)], 4, np.array([7]))
+    ends = PrescribedEnds(
+        [PrescribedEnd(0, steady(2.0)), PrescribedEnd(5, turned(lambda t: t**3), place)], 4, np.array([7])
+    )
     assert list(ends.index) == [0, 1, 2, 3, 20, 21, 22, 23, 31]
     expected = [0, 0, 0, 1.0, 0.5, 1.25, 0, 3.375 - 1.0, 0]
     assert ends.motion(1.0, 1.5) == pytest.approx(expected, abs=4 * EPS)
-    assert HeldEnds([HeldEnd(0, spinning(lambda t: 3 * t**2))], 4, np.array([], int)).motion(1.0, 1.5)[
+    assert PrescribedEnds([PrescribedEnd(0, spinning(lambda t: 3 * t**2))], 4, np.array([], int)).motion(1.0, 1.5)[
         3
     ] == pytest.approx(3.375 - 1.0, rel=4 * EPS)
     # Without twist unknowns e1 has no turn of its own.
-    assert list(HeldEnds([HeldEnd(2, steady(0.0))], 3, np.array([], int)).index) == [6, 7, 8]
+    assert list(PrescribedEnds([PrescribedEnd(2, steady(0.0))], 3, np.array([], int)).index) == [6, 7, 8]
 
 
 # Held ends stay where they are
@@ -101,14 +103,14 @@ def waving(**keys: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("scheme", ["semi-implicit", "implicit"])
 def test_held_nodes_stay_put_to_the_last_bit_while_the_rod_waves(scheme: str) -> None:
     simulation = Simulation(scene({"rod": waving(start=HINGED, finish=CLAMPED)}, step=0.01, scheme=scheme))
-    before = simulation.shape.r.copy()
+    before = simulation.configuration.r.copy()
     simulation.advance(0.3, lambda: None)
-    moved = np.linalg.norm(simulation.shape.r - before, axis=1)
+    moved = np.linalg.norm(simulation.configuration.r - before, axis=1)
     assert moved[0] == moved[-1] == 0.0
     assert moved[1:-1].min() > 0.0
-    velocity = simulation.frame().filaments["rod"].velocity
+    velocity = simulation.snapshot().filaments["rod"].velocity
     assert np.all(velocity[[0, -1]] == 0.0)
-    assert np.abs(simulation.shape.e3[-1] - [1, 0, 0]).max() == 0.0
+    assert np.abs(simulation.configuration.e3[-1] - [1, 0, 0]).max() == 0.0
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
@@ -126,9 +128,9 @@ def steps(case: Case, scheme: timestepping_base.Stepper, dt: float, count: int) 
     rods = assembly_rods.rods(case)
     fluid = fluid_model(case).build(rods)
     shape = rods.start
-    state = State(0.0, shape, np.zeros((len(shape.r), rods.mechanics.unknowns)), 0.0)
+    state = State(0.0, shape, np.zeros((len(shape.r), rods.system.unknowns)), 0.0)
     for _ in range(count):
-        step = scheme.step(rods.mechanics, fluid, state, dt)
+        step = scheme.step(rods.system, fluid, state, dt)
         yield state, step
         state = step.state
 
@@ -153,15 +155,15 @@ def loaded(**keys: Any) -> Case:
 def test_the_force_on_the_fluid_is_the_drag_of_the_velocity(scheme: timestepping_base.Stepper) -> None:
     """Z = Lc [zeta_perp (1 - e3 e3) + zeta_par e3 e3], e3 where the scheme freezes it; Lc zeta_r for the spin."""
     case = loaded()
-    mechanics, eta, a, dt = assembly_rods.rods(case).mechanics, 0.7, 0.05, 2e-4
+    system, eta, a, dt = assembly_rods.rods(case).system, 0.7, 0.05, 2e-4
     for state, step in steps(case, scheme, dt, 4):
         extrapolated = scheme.order == 2 and state.dt_old > 0
-        e3 = mechanics.move(state.shape, state.y_old).e3 if extrapolated else state.shape.e3
+        e3 = system.move(state.configuration, state.y_old).e3 if extrapolated else state.configuration.e3
         y = step.state.y_old
         rate = (1.5 * y - 0.5 * state.y_old) / dt if extrapolated else y / dt
         along = np.sum(rate[:, :3] * e3, axis=1)[:, None] * e3
-        drag = mechanics.mesh.volume[:, None] * 4 * np.pi * eta * (rate[:, :3] - 0.5 * along)
-        torque = mechanics.mesh.volume * 4 * np.pi * eta * a**2 * rate[:, 3]
+        drag = system.mesh.volume[:, None] * 4 * np.pi * eta * (rate[:, :3] - 0.5 * along)
+        torque = system.mesh.volume * 4 * np.pi * eta * a**2 * rate[:, 3]
         assert step.velocity == pytest.approx(rate, abs=1e-12 * np.abs(rate).max())
         assert step.force[:, :3] == pytest.approx(drag, abs=1e-12 * np.abs(drag).max())
         assert step.force[:, 3] == pytest.approx(torque, abs=1e-12 * np.abs(torque).max())
@@ -178,7 +180,7 @@ def test_reactions_and_loads_balance_the_drag(scheme: str, spun_only: bool) -> N
     case, dt = loaded(finish={}) if spun_only else loaded(), 0.02
     left = 1e-12 if spun_only else 4 * np.pi * 0.7 * 1e-8 / dt
     for _, step in steps(case, SCHEMES[scheme], dt, 6):
-        load = np.zeros(3) if spun_only else -2.0 * step.state.shape.e3[-1]
+        load = np.zeros(3) if spun_only else -2.0 * step.state.configuration.e3[-1]
         drag, reaction = step.force[:, :3].sum(axis=0), step.reaction[:, :3].sum(axis=0)
         assert np.linalg.norm(reaction) > 0.1
         assert drag == pytest.approx(reaction + load, abs=left)
@@ -217,12 +219,12 @@ def settled(nodes: int, derivative: int) -> Simulation:
 
 def test_a_cantilever_at_rest_hands_its_whole_load_to_the_clamp() -> None:
     simulation = settled(17, 6)
-    frame = simulation.frame().filaments["rod"]
-    load = -1.5 * simulation.shape.e3[-1]
-    assert frame.reaction_start == pytest.approx(-load, abs=1e-9)
-    assert frame.reaction_finish is None
-    assert np.abs(frame.force.sum(axis=0)).max() < 1e-9
-    assert np.abs(frame.velocity).max() < 1e-9
+    snapshot = simulation.snapshot().filaments["rod"]
+    load = -1.5 * simulation.configuration.e3[-1]
+    assert snapshot.reaction_start == pytest.approx(-load, abs=1e-9)
+    assert snapshot.reaction_finish is None
+    assert np.abs(snapshot.force.sum(axis=0)).max() < 1e-9
+    assert np.abs(snapshot.velocity).max() < 1e-9
 
 
 @pytest.mark.parametrize("derivative", [2, 6])
@@ -231,9 +233,9 @@ def test_its_clamp_carries_the_moment_of_the_load_to_second_order(derivative: in
     errors = []
     for nodes in (17, 33, 65):
         simulation = settled(nodes, derivative)
-        shape = simulation.shape
+        shape = simulation.configuration
         lever = np.cross(shape.r[-1] - shape.r[0], -1.5 * shape.e3[-1])
-        moment = simulation.mechanics.moment(shape, 0.0).bend[0]
+        moment = simulation.system.moment(shape, 0.0).bend[0]
         clamp = moment[0] * shape.e1[0] + moment[1] * shape.e2[0]
         errors.append(float(np.linalg.norm(clamp - lever)))
     assert min(slopes(errors)) >= 1.9
@@ -246,18 +248,18 @@ def test_moves_and_reactions_are_those_of_lagranges_multipliers(m: int, seed: in
     """The implicit answer of RFT against one dense solve with a multiplier for each held unknown."""
     keys = {} if m == 3 else {**TWIST, "bending": [1.0, 0.5]}
     rods = assembly_rods.rods(scene({"rod": {**ROD, **keys, "nodes": 9, "shape": {"kind": "circle", "curvature": 1}}}))
-    mechanics, shape = rods.mechanics, rods.start
+    system, shape = rods.system, rods.start
     rng = np.random.default_rng(seed)
     n = 9
     drag = resistive_force.Drag(*(rng.uniform(1.0, 2.0, n) for _ in range(3)))
-    held = Held(np.sort(rng.choice(n * m, 5, replace=False)), rng.standard_normal(5))
+    held = Prescribed(np.sort(rng.choice(n * m, 5, replace=False)), rng.standard_normal(5))
     force, y, target = rng.standard_normal((3, n, m))
-    _, moment = mechanics.forces(shape, 0.0)
-    matrix = mechanics.stiffness(shape, shape, moment, 0.0)
+    _, moment = system.forces(shape, 0.0)
+    matrix = system.stiffness(shape, shape, moment, 0.0)
     k = banded.dense(matrix).reshape(n * m, n * m)
     tau = 0.03
     answer = (
-        resistive_force.ResistiveForce(drag, mechanics.profile)
+        resistive_force.ResistiveForce(drag, system.profile)
         .response(shape.r, shape.e3, 0.0, tau)
         .implicit(force, matrix, held, y, target)
     )
@@ -290,8 +292,8 @@ def test_without_stiffness_the_reaction_is_what_the_prescribed_velocity_needs(m:
     drag = resistive_force.Drag(*(rng.uniform(1.0, 2.0, n) for _ in range(3)))
     e3 = np.tile([0.6, 0.8, 0.0], (n, 1))
     force = rng.standard_normal((n, m))
-    held = Held(np.arange(m), rng.standard_normal(m))
-    where = mesh.profile(assembly_rods.rods(scene({"rod": {**ROD, "nodes": 8}})).mechanics.mesh)
+    held = Prescribed(np.arange(m), rng.standard_normal(m))
+    where = mesh.profile(assembly_rods.rods(scene({"rod": {**ROD, "nodes": 8}})).system.mesh)
     response = resistive_force.ResistiveForce(drag, where).response(np.zeros((n, 3)), e3, 0.0, tau)
     answer = response.forced(force, held, np.zeros((n, m)))
     z = np.zeros((m, m))
@@ -328,8 +330,8 @@ def test_a_rod_described_from_its_other_end_moves_the_same(scheme: str) -> None:
         "position": [1, 0, 0],
         "direction": [-1, 0, 0],
     }
-    one = run(twisting_rod(rod=ahead, **time)).shape
-    two = run(twisting_rod(rod=back, **time)).shape
+    one = run(twisting_rod(rod=ahead, **time)).configuration
+    two = run(twisting_rod(rod=back, **time)).configuration
     assert np.ptp(one.r[:, 1]) > 1e-3
     # The same arithmetic in another order; Newton stops at 1e-8 of the length, and squares its error.
     assert np.abs(one.r - two.r[::-1]).max() < 1e-10
@@ -341,7 +343,7 @@ def test_a_filament_that_does_not_twist_is_not_changed_by_one_that_does() -> Non
     alone = run(scene({"a": planar}, end=0.2, step=0.01))
     both = run(scene({"b": spatial, "a": planar}, end=0.2, step=0.01))
     where = both.nodes("a")
-    assert both.mechanics.unknowns == 4
+    assert both.system.unknowns == 4
     # Filaments are corrected together until the slowest has converged to Newton's 1e-8 of the length.
-    assert np.abs(both.shape.r[where] - alone.shape.r).max() < Implicit().tolerance
-    assert np.abs(both.shape.e1[where] - alone.shape.e1).max() < Implicit().tolerance
+    assert np.abs(both.configuration.r[where] - alone.configuration.r).max() < Implicit().tolerance
+    assert np.abs(both.configuration.e1[where] - alone.configuration.e1).max() < Implicit().tolerance

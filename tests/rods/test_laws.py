@@ -60,7 +60,7 @@ def unstrained(count: int, bending: float = 1.0, torsion: float = 1.0) -> Linear
 
 @pytest.mark.parametrize("name", LAWS)
 def test_the_derivatives_of_a_law_are_those_of_its_moments(name: str) -> None:
-    """Central differences, to 1e-8; the part that comes from half nodes beside is in ``beside``."""
+    """Central differences, to 1e-8; the part that comes from half nodes beside is in ``nonlocal_twist``."""
     law, h, time = LAWS[name], 1e-6, 1.3
     bend, twist = (2 * np.random.default_rng(3).standard_normal(shape) for shape in ((N, 2), N))
     _, slope = law.bending(bend, time)
@@ -71,8 +71,8 @@ def test_the_derivatives_of_a_law_are_those_of_its_moments(name: str) -> None:
     assert slope == pytest.approx(np.swapaxes(slope, 1, 2), rel=1e-13)  # there is an energy
     _, slope3 = law.twisting(twist, time)
     exact = np.diag(slope3[:-1])
-    if law.beside is not None:
-        exact = exact + np.diag(law.beside[1:-1, 0], -1) + np.diag(law.beside[:-2, 1], 1)
+    if law.nonlocal_twist is not None:
+        exact = exact + np.diag(law.nonlocal_twist[1:-1, 0], -1) + np.diag(law.nonlocal_twist[:-2, 1], 1)
     for j in range(N - 1):
         step = h * np.eye(N)[j]
         numerical = (law.twisting(twist + step, time)[0] - law.twisting(twist - step, time)[0])[:-1] / (2 * h)
@@ -133,36 +133,36 @@ def test_nonlinear_laws_are_in_the_exact_jacobian(laws: tuple, derivative: int, 
         "a": {**common, "law": laws[0] or {"kind": "linear"}, "start": CLAMPED},
         "b": {**common, "law": laws[1] or {"kind": "linear"}, "position": [0, 1, 0], "finish": CLAMPED},
     }
-    mechanics = Simulation(scene(rods)).mechanics
+    system = Simulation(scene(rods)).system
     s = np.linspace(0, 1.3, 9) ** 1.1
     curve = np.stack([s, 0.2 * np.sin(3 * s), 0.3 * np.cos(4 * s) - 0.3], axis=1)
     rng = np.random.default_rng(3)
     r = np.concatenate([curve, curve + np.array([0, 1, 0])]) + 1e-3 * rng.standard_normal((18, 3))
-    start = mechanics.start(r, np.array([0.1, 1.0, 0.3]) + 0.4 * rng.standard_normal((18, 3)))
+    start = system.start(r, np.array([0.1, 1.0, 0.3]) + 0.4 * rng.standard_normal((18, 3)))
     y = 0.02 * rng.standard_normal((18, 4))
     y[:, :3] *= 0.1
-    assert_exact_jacobian(mechanics, start, y)
+    assert_exact_jacobian(system, start, y)
 
 
 def test_the_solver_knows_how_far_a_domain_wall_reaches() -> None:
     """The step's matrix by bands, where its profile says it is not zero, has the inverse of the whole matrix."""
     rod = {**TWISTING, "nodes": 15, "twist_rate": "3*s", "curvature": ["s", 1], "law": TWO_WELL, "start": CLAMPED}
-    mechanics = Simulation(scene({"rod": {**rod, "shape": {"kind": "relaxed"}}})).mechanics
-    shape = mechanics.start(*(np.random.default_rng(k).standard_normal((15, 3)) for k in (0, 1)))
-    _, moment = mechanics.forces(shape, 0.0)
-    matrix = mechanics.stiffness(shape, shape, moment, 0.0)
+    system = Simulation(scene({"rod": {**rod, "shape": {"kind": "relaxed"}}})).system
+    shape = system.start(*(np.random.default_rng(k).standard_normal((15, 3)) for k in (0, 1)))
+    _, moment = system.forces(shape, 0.0)
+    matrix = system.stiffness(shape, shape, moment, 0.0)
     whole = banded.dense(matrix).reshape(60, 60)
-    rows, width = np.arange(15), mechanics.profile.width
-    assert np.all(mechanics.profile.first >= rows - width)
+    rows, width = np.arange(15), system.profile.width
+    assert np.all(system.profile.first >= rows - width)
     nodes = np.abs(banded.dense(matrix)).max(axis=(1, 3)) > 0
-    assert all(not nodes[i, : mechanics.profile.first[i]].any() for i in rows)
+    assert all(not nodes[i, : system.profile.first[i]].any() for i in rows)
     right = np.random.default_rng(2).standard_normal((15, 4))
     shifted = matrix.copy()
     size = np.abs(matrix).max()
     for k in range(4):
         shifted[:, k, width * 4 + k] -= 10 * size
     exact = np.linalg.solve(whole - 10 * size * np.eye(60), right.ravel()).reshape(15, 4)
-    assert banded.solve(shifted, right, mechanics.profile) == pytest.approx(exact, rel=1e-10, abs=1e-12 / size)
+    assert banded.solve(shifted, right, system.profile) == pytest.approx(exact, rel=1e-10, abs=1e-12 / size)
 
 
 class Varying(Cubic):
@@ -186,7 +186,7 @@ def test_a_law_from_python_is_the_one_of_the_case_that_says_the_same() -> None:
             scene({"rod": {**keys, "law": law or {"kind": "linear"}}}, end=1.0, step=0.1), laws=laws
         )
         simulation.advance(1.0, lambda: None)
-        ends.append(simulation.shape)
+        ends.append(simulation.configuration)
     assert ends[0].r == pytest.approx(ends[1].r, abs=1e-11)
     assert ends[0].e1 == pytest.approx(ends[1].e1, abs=1e-11)
     assert np.abs(ends[0].bend).max() > 0.5
@@ -194,8 +194,8 @@ def test_a_law_from_python_is_the_one_of_the_case_that_says_the_same() -> None:
     varying.advance(1.0, lambda: None)
     strains = {"curvature": ["sin(3*s)*t", 0], "twist_rate": "2*s*t"}
     plain = run(scene({"rod": {**TWISTING, **strains}}, end=1.0, step=0.1))
-    assert varying.shape.r == pytest.approx(plain.shape.r, abs=1e-12)
-    assert varying.shape.e1 == pytest.approx(plain.shape.e1, abs=1e-12)
+    assert varying.configuration.r == pytest.approx(plain.configuration.r, abs=1e-12)
+    assert varying.configuration.e1 == pytest.approx(plain.configuration.e1, abs=1e-12)
 
 
 def test_a_law_for_a_filament_there_is_not_is_refused() -> None:
@@ -209,7 +209,7 @@ def test_a_law_that_gives_arrays_of_other_shapes_is_told_so() -> None:
             return strain, np.eye(2)
 
     with pytest.raises(TypeError, match=r"law .*Flat: found an array \(2, 2\); wanted \(33, 2, 2\)"):
-        Simulation(scene({"rod": ROD}), laws={"rod": Flat()}).frame()
+        Simulation(scene({"rod": ROD}), laws={"rod": Flat()}).snapshot()
 
 
 def test_a_run_goes_on_only_with_the_laws_it_began_with(tmp_path) -> None:
@@ -225,11 +225,11 @@ def test_a_run_goes_on_only_with_the_laws_it_began_with(tmp_path) -> None:
     again = Simulation(case, laws=laws)
     again.restore(cut.state())
     again.advance(0.2, lambda: None)
-    assert again.shape.r == pytest.approx(whole.shape.r, abs=1e-8)
+    assert again.configuration.r == pytest.approx(whole.configuration.r, abs=1e-8)
     quiet = {"progress": False, "log": lambda line: None}
     path = tmp_path / "run.h5"
     result = run_case(case, path, laws=laws, **quiet)
-    assert result.frame.filaments["rod"].position == pytest.approx(whole.shape.r, abs=1e-8)
+    assert result.snapshot.filaments["rod"].position == pytest.approx(whole.configuration.r, abs=1e-8)
 
 
 @pytest.mark.parametrize(

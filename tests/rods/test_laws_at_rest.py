@@ -19,7 +19,7 @@ from ibfil.simulation.simulation import Simulation
 def test_a_stiffening_rod_bends_less_into_an_arc_under_an_end_moment(twists: bool) -> None:
     """m = A k (1 + c k^p), the same all along."""
     rod = {**(TWISTING if twists else ROD), "law": STIFFENING, "start": CLAMPED, "finish": {"moment": [0, 0, 4]}}
-    strain = settled(rod).frame().filaments["rod"].strain[:-1, 0]
+    strain = settled(rod).snapshot().filaments["rod"].strain[:-1, 0]
     assert strain * (1 + 0.3 * strain**1.5) == pytest.approx(np.full(32, 4.0), rel=1e-5)
     assert strain[0] < 2.6
 
@@ -28,18 +28,20 @@ def test_a_stiffening_rod_twists_less_under_a_couple() -> None:
     """m = C t (1 + c |t|^p) with C = 0.6, either way round."""
     for sign in (1, -1):
         moment = {"moment": [0, 0, sign * 2.0], "frame": "body"}
-        twist = sign * settled({**TWISTING, "law": STIFFENING, "start": CLAMPED, "finish": moment}).shape.twist[:-1]
+        twist = (
+            sign * settled({**TWISTING, "law": STIFFENING, "start": CLAMPED, "finish": moment}).configuration.twist[:-1]
+        )
         assert 0.6 * twist * (1 + 0.3 * twist**1.5) == pytest.approx(np.full(32, 2.0), rel=1e-8)
 
 
 def test_moduli_and_radius_may_vary_along_a_rod() -> None:
     """Bent by m/A(s), stretched by f/EA(s), twisted at a spinning clamp by the drag of what is beyond, over C(s)."""
     keys = {"bending": ["1 + s", "2 - s"], "stretching": "1e4*(1 + 3*s)", "start": CLAMPED}
-    bent = settled({**ROD, **keys, "finish": {"moment": [0, 0, 2]}}).frame().filaments["rod"]
+    bent = settled({**ROD, **keys, "finish": {"moment": [0, 0, 2]}}).snapshot().filaments["rod"]
     s = np.linspace(0, 1, 33)
     assert bent.strain[:-1, 0] == pytest.approx((2 / (1 + s))[:-1], rel=1e-3)
     pulled = settled({**ROD, **keys, "finish": {"force": [30, 0, 0]}})
-    stretch = pulled.shape.length[:-1] * 32 - 1
+    stretch = pulled.configuration.length[:-1] * 32 - 1
     assert stretch == pytest.approx(30 / (1e4 * (1 + 3 * half(s))), rel=1e-8)
     errors = []
     for nodes in (21, 41):
@@ -49,7 +51,7 @@ def test_moduli_and_radius_may_vary_along_a_rod() -> None:
         spun = settled(rod, end=200.0, step=0.5)
         # M3' = zeta_r w, zeta_r = 4 pi eta a^2, M3(L) = 0; a = 0.1 (1 - s/2)
         moment = -2.0 * 4 * np.pi * 0.01 * (2 / 3) * ((1 - 0.5 * half(s)) ** 3 - 0.125)
-        errors.append(float(np.abs(spun.shape.twist[:-1] - moment / (1 + half(s))).max()))
+        errors.append(float(np.abs(spun.configuration.twist[:-1] - moment / (1 + half(s))).max()))
     assert errors[-1] < 1e-4
     assert slopes(errors)[-1] > 1.9
 
@@ -74,9 +76,11 @@ def test_filaments_with_laws_of_their_own_do_in_one_scene_what_they_do_alone() -
     together = after(placed)
     for name, rod in placed.items():
         alone, where = after({name: rod}), together.nodes(name)
-        assert together.shape.r[where] == pytest.approx(alone.shape.r, abs=1e-8)
-        assert together.shape.e1[where] == pytest.approx(alone.shape.e1, abs=1e-8)
-        moved = np.abs(alone.shape.r - alone.start.r).max() + np.abs(alone.shape.e1 - alone.start.e1).max()
+        assert together.configuration.r[where] == pytest.approx(alone.configuration.r, abs=1e-8)
+        assert together.configuration.e1[where] == pytest.approx(alone.configuration.e1, abs=1e-8)
+        moved = (
+            np.abs(alone.configuration.r - alone.start.r).max() + np.abs(alone.configuration.e1 - alone.start.e1).max()
+        )
         assert moved > 1e-3
 
 
@@ -106,7 +110,7 @@ def wall(nodes: int, moment: float = 0.0, width: float = XI, **keys: Any) -> dic
 
 def crossing(simulation: Simulation) -> float:
     """Where the twist goes through zero."""
-    return float(np.interp(0.0, simulation.shape.twist[:-1], half(simulation.arclength)))
+    return float(np.interp(0.0, simulation.configuration.twist[:-1], half(simulation.arclength)))
 
 
 @pytest.mark.parametrize("spacing", ["even", "q + 0.1*sin(2*pi*q)/(2*pi)"], ids=["even", "uneven"])
@@ -116,7 +120,7 @@ def test_between_wells_as_deep_a_wall_stands_still_in_the_shape_of_a_hyperbolic_
     for nodes in (31, 61, 121):
         simulation = settled(wall(nodes, width=1.5 * XI, spacing=spacing), end=120.0, step=4.0)
         exact = np.tanh((half(simulation.arclength) - crossing(simulation)) / XI)
-        errors.append(float(np.abs(simulation.shape.twist[:-1] - exact).max()))
+        errors.append(float(np.abs(simulation.configuration.twist[:-1] - exact).max()))
     assert errors[-1] < 2e-3
     assert slopes(errors)[-1] > 1.9
     assert abs(crossing(simulation) - 2.0) < 0.05

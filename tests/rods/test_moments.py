@@ -32,7 +32,7 @@ def test_an_end_moment_bends_a_rod_into_a_circular_arc_of_curvature_m_over_a(
     for nodes in (17, 33, 65):
         keys = {other: CLAMPED, end: {"moment": moment, "frame": frame}}
         simulation = settled({**ROD, **keys, "bending": list(bending), "nodes": nodes, "derivative": derivative})
-        rod, s = simulation.frame().filaments["rod"], simulation.arclength - (0.0 if end == "finish" else 1.0)
+        rod, s = simulation.snapshot().filaments["rod"], simulation.arclength - (0.0 if end == "finish" else 1.0)
         side = 1 - np.cos(curvature * s)
         exact = np.stack([np.sin(curvature * s), (1 - about) * side, about * side], axis=1) / curvature
         errors.append(rms(rod.position - simulation.start.r[0 if end == "finish" else -1] - exact))
@@ -55,7 +55,7 @@ def test_a_moment_fixed_in_the_lab_winds_a_rod_into_a_helix_about_it() -> None:
     for nodes in (17, 33, 65):
         rod = {**TWISTING, "nodes": nodes, "start": CLAMPED, "finish": {"moment": m.tolist()}}
         simulation = settled(rod)
-        shape, s = simulation.shape, simulation.arclength
+        shape, s = simulation.configuration, simulation.arclength
         exact = Rotation.from_rotvec(m * s[:, None]).apply([1.0, 0.0, 0.0])
         errors.append(rms(shape.e3 - exact))
         twists.append(np.abs(shape.twist[:-1] - m[0] / 0.6).max())
@@ -76,13 +76,13 @@ def test_a_twist_couple_twists_a_rod_by_m3_over_c(end: str, frame: str) -> None:
     simulation = settled(rod)
     sign, s = (1 if end == "finish" else -1), simulation.arclength
     expected = sign * 0.3 / (0.5 * (1 / (2 + s[1:]) + 1 / (2 + s[:-1])))
-    assert simulation.shape.twist[:-1] == pytest.approx(expected, rel=1e-9)
+    assert simulation.configuration.twist[:-1] == pytest.approx(expected, rel=1e-9)
     # At nodes: the mean of the half nodes beside them, at an end that of the one there is.
     nodal = np.concatenate([expected[:1], 0.5 * (expected[1:] + expected[:-1]), expected[-1:]])
-    found = simulation.frame().filaments["rod"]
+    found = simulation.snapshot().filaments["rod"]
     assert found.strain[:, 2] == pytest.approx(nodal, rel=1e-9)
     assert found.moment[:, 2] == pytest.approx(np.full(33, sign * 0.3), rel=1e-9)
-    assert np.abs(simulation.shape.r[:, 1:]).max() < 1e-12
+    assert np.abs(simulation.configuration.r[:, 1:]).max() < 1e-12
 
 
 # Moments along the rod
@@ -93,7 +93,7 @@ def test_an_active_moment_bends_a_rod_into_a_clothoid() -> None:
     errors = []
     for nodes in (17, 33, 65):
         simulation = settled({**ROD, "nodes": nodes, "start": CLAMPED, "loads": {"moment": [3.0, 0, 0]}})
-        moment = simulation.frame().filaments["rod"].moment[:, 0]
+        moment = simulation.snapshot().filaments["rod"].moment[:, 0]
         errors.append(np.abs(moment - 3.0 * (1 - simulation.arclength)).max())
     assert errors[-1] < 1e-3
     assert min(slopes(errors)) > 1.9
@@ -103,11 +103,11 @@ def test_an_active_moment_about_the_tangent_twists_a_clamped_rod_and_spins_a_fre
     """M3 = m3 (L - s) at every half node; a free rod turns at m3/zeta_r, zeta_r = 4 pi eta a^2, and does not twist."""
     loads = {"loads": {"moment": [0, 0, 0.4]}}
     simulation = settled({**TWISTING, "start": CLAMPED, **loads})
-    assert simulation.shape.twist[:-1] == pytest.approx(0.4 * (1 - half(simulation.arclength)) / 0.6, rel=1e-9)
+    assert simulation.configuration.twist[:-1] == pytest.approx(0.4 * (1 - half(simulation.arclength)) / 0.6, rel=1e-9)
     free = run(scene({"rod": {**TWISTING, **loads}}, end=0.5, step=0.05))
     angle = 0.5 * 0.4 / (4 * np.pi * 0.1**2)
-    assert free.shape.e1 == pytest.approx(np.tile([0, -np.sin(angle), np.cos(angle)], (33, 1)), abs=1e-10)
-    assert np.abs(free.shape.twist).max() < 1e-10
+    assert free.configuration.e1 == pytest.approx(np.tile([0, -np.sin(angle), np.cos(angle)], (33, 1)), abs=1e-10)
+    assert np.abs(free.configuration.twist).max() < 1e-10
 
 
 def test_an_internal_moment_is_a_preferred_curvature_times_minus_the_modulus() -> None:
@@ -115,7 +115,7 @@ def test_an_internal_moment_is_a_preferred_curvature_times_minus_the_modulus() -
     rod = {**ROD, "bending": [2.0, 0.5], "twisting": 0.6, "radius": 0.1, "anchor": "middle"}
     internal = {"loads": {"internal_moment": ["-2*sin(5*s - 3*t)", "-0.5*(1 + s)*t"]}}
     preferred = {"curvature": ["sin(5*s - 3*t)", "(1 + s)*t"]}
-    ends = [run(scene({"rod": {**rod, **keys}}, end=0.5, step=0.05)).shape for keys in (internal, preferred)]
+    ends = [run(scene({"rod": {**rod, **keys}}, end=0.5, step=0.05)).configuration for keys in (internal, preferred)]
     assert rms(ends[0].r - ends[1].r) < 1e-12
     assert rms(ends[0].e1 - ends[1].e1) < 1e-12
     assert np.abs(ends[0].bend).max() > 0.1
@@ -133,8 +133,8 @@ def test_a_rod_gets_the_moment_that_is_put_on_its_end(force: str, end: str, fram
             shape["perturb"] = ["0.1*s**2", "0.05*s", 0]
         keys = {"nodes": nodes, "derivative": 2, "shape": shape, end: {"moment": m.tolist(), "frame": frame}}
         simulation = Simulation(scene({"rod": {**TWISTING, "force": force, **keys}}))
-        given, g = np.zeros((nodes, 4)), simulation.shape
-        for load in simulation.mechanics.loads:
+        given, g = np.zeros((nodes, 4)), simulation.configuration
+        for load in simulation.system.loads:
             load.add_force(g, 0.0, given)
         torque = np.cross(g.r, given[:, :3]).sum(axis=0) + (given[:, 3:] * g.e3).sum(axis=0)
         i = 0 if end == "start" else -1

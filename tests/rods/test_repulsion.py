@@ -106,14 +106,14 @@ def test_the_stiffness_of_a_segment_on_itself_is_exact_along_the_gap():
     """One rod moved along the gap: its force changes by its own blocks. What couples the rods is left out."""
     scene = case(crossed(0.03, 0.0), {"action": "repel", "distance": 0.02, "strength": 2.0})
     simulation = Simulation(scene)
-    rods, shape = simulation.mechanics, simulation.shape
+    rods, shape = simulation.system, simulation.configuration
     upper = simulation.nodes("upper")
 
-    def matrix(mechanics) -> np.ndarray:
-        _, moment = mechanics.forces(shape, 0.0)
-        return mechanics.stiffness(shape, shape, moment, 0.0)
+    def matrix(system) -> np.ndarray:
+        _, moment = system.forces(shape, 0.0)
+        return system.stiffness(shape, shape, moment, 0.0)
 
-    without = Simulation(case(crossed(0.03, 0.0), None)).mechanics
+    without = Simulation(case(crossed(0.03, 0.0), None)).system
     from ibfil.linalg import banded
 
     move, step = np.zeros_like(shape.r), 1e-6
@@ -137,10 +137,10 @@ def test_rods_pressed_together_rest_where_the_repulsion_carries_the_load():
         crossed(0.2, 1.2), {"action": "repel", "distance": 0.02, "strength": 2.0}, end=8.0, every=8.0, step=0.05
     )
     result, _ = ran(scene)
-    upper, lower = (rod.position for rod in result.frame.filaments.values())
+    upper, lower = (rod.position for rod in result.snapshot.filaments.values())
     assert np.mean(upper[5:7, 2]) - np.mean(lower[5:7, 2]) == pytest.approx(1.4 * 0.02, rel=1e-5)
-    assert result.frame.diagnostics["contacts"] == 0
-    assert np.abs(result.frame.filaments["upper"].velocity).max() < 1e-4
+    assert result.snapshot.diagnostics["contacts"] == 0
+    assert np.abs(result.snapshot.filaments["upper"].velocity).max() < 1e-4
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "semi-implicit"])
@@ -155,15 +155,15 @@ def test_rods_side_by_side_do_not_pass_through_each_other(scheme, strength, aske
     nearest = []
 
     def look() -> None:
-        pairs = simulation.rods.contact.near(simulation.shape.r, 3.0)
+        pairs = simulation.rods.contact.near(simulation.configuration.r, 3.0)
         nearest.append(pairs.distance.min(initial=1.0))
         assert np.min(pairs.gap[:, 2] * (pairs.i - pairs.j), initial=0.0) <= 0.0  # the lower one comes second
 
     simulation.advance(0.25, look)
     assert min(nearest) > 0.5 * 0.04
     assert (
-        simulation.shape.r[simulation.nodes("upper"), 2].mean()
-        > simulation.shape.r[simulation.nodes("lower"), 2].mean()
+        simulation.configuration.r[simulation.nodes("upper"), 2].mean()
+        > simulation.configuration.r[simulation.nodes("lower"), 2].mean()
     )
 
 
@@ -172,9 +172,9 @@ def test_rods_do_not_pass_through_each_other_in_one_long_step():
     contact = {"action": "repel", "distance": 0.05, "strength": 40.0}
     scene = case(crossed(0.12, 4 * np.pi), contact, step=0.2, end=0.4, every=0.4)
     result, _ = ran(scene)
-    upper, lower = (rod.position[:, 2] for rod in result.frame.filaments.values())
+    upper, lower = (rod.position[:, 2] for rod in result.snapshot.filaments.values())
     assert np.min(upper[5:7]) > np.max(lower[5:7])
-    assert result.frame.diagnostics["steps_shortened"] > 0
+    assert result.snapshot.diagnostics["steps_shortened"] > 0
 
 
 def test_a_load_that_would_press_rods_through_each_other_fails_the_run():
@@ -190,7 +190,7 @@ def test_rods_repel_in_a_grid_fluid_too():
     contact = {"action": "repel", "distance": 0.05, "strength": 20.0}
     scene = case(crossed(0.12, 4.0), contact, GRID, step=0.01, end=0.3, every=0.3)
     result, _ = ran(scene)
-    upper, lower = (rod.position[5:7, 2] for rod in result.frame.filaments.values())
+    upper, lower = (rod.position[5:7, 2] for rod in result.snapshot.filaments.values())
     assert np.mean(upper) - np.mean(lower) > 0.05
-    scale = np.abs(result.frame.filaments["upper"].force).sum()
-    assert np.abs(result.frame.diagnostics["net_force"]).max() < 1e-6 * scale
+    scale = np.abs(result.snapshot.filaments["upper"].force).sum()
+    assert np.abs(result.snapshot.diagnostics["net_force"]).max() < 1e-6 * scale

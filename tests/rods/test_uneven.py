@@ -37,7 +37,7 @@ CLAMPED = {"end": "clamped"}
 def settled(rod: Mapping[str, Any]) -> Simulation:
     """The rod at rest: backward Euler with steps far longer than any relaxation."""
     simulation = run(scene({"rod": rod}, end=240.0, step=20.0, order=1))
-    assert np.abs(simulation.frame().filaments["rod"].velocity).max() < 1e-9
+    assert np.abs(simulation.snapshot().filaments["rod"].velocity).max() < 1e-9
     return simulation
 
 
@@ -60,7 +60,7 @@ def test_a_soft_rod_under_end_tension_has_the_exact_stretch(derivative: int, for
     pulled = {"finish": {"force": [2.0, 0, 0]}}
     for start in (CLAMPED, {"force": [-2.0, 0, 0]}):
         simulation = settled({**rod, **pulled, "start": start})
-        r = simulation.shape.r
+        r = simulation.configuration.r
         assert np.diff(r[:, 0]) == pytest.approx(1.2 * np.diff(simulation.arclength), rel=1e-9)
         assert np.abs(r[:, 1:]).max() == 0.0
 
@@ -72,8 +72,8 @@ def test_an_uneven_soft_rod_hangs_by_the_weight_below_each_half_node(spacing: st
     simulation = settled({**rod, "loads": {"weight": [3.0, 0, 0]}})
     s = simulation.arclength
     tension = 3.0 * (1 - 0.5 * (s[1:] + s[:-1]))
-    assert simulation.frame().filaments["rod"].tension == pytest.approx(tension, rel=1e-8)
-    assert simulation.shape.r[-1, 0] == pytest.approx(1.15, abs=1e-9)
+    assert simulation.snapshot().filaments["rod"].tension == pytest.approx(tension, rel=1e-8)
+    assert simulation.configuration.r[-1, 0] == pytest.approx(1.15, abs=1e-9)
 
 
 # Uneven
@@ -82,10 +82,10 @@ def test_an_uneven_soft_rod_hangs_by_the_weight_below_each_half_node(spacing: st
 def bending_matrices(rod: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """K and Z of a straight rod's moves across it at rest, without its clamped first node."""
     simulation = settled(rod)
-    mechanics, shape = simulation.mechanics, simulation.shape
-    _, moment = mechanics.forces(shape, 0.0)
-    k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0))[1:, 1, 1:, 1]
-    return k, np.diag(PERP * mechanics.mesh.volume[1:])
+    system, shape = simulation.system, simulation.configuration
+    _, moment = system.forces(shape, 0.0)
+    k = banded.dense(system.stiffness(shape, shape, moment, 0.0))[1:, 1, 1:, 1]
+    return k, np.diag(PERP * system.mesh.volume[1:])
 
 
 @UNEVEN
@@ -129,7 +129,7 @@ def test_an_uneven_rod_bends_into_an_arc_under_an_end_moment(derivative: int, sp
         simulation = settled({**rod, "finish": {"moment": [0, 0, 2.0]}})
         s = simulation.arclength
         exact = np.stack([np.sin(2 * s), 1 - np.cos(2 * s), 0 * s], axis=1) / 2
-        errors.append(rms(simulation.shape.r - exact))
+        errors.append(rms(simulation.configuration.r - exact))
     assert errors[1] < 1e-3
     assert slopes(errors)[-1] > 1.9
 
@@ -141,10 +141,10 @@ def test_twist_diffuses_along_an_uneven_rod_at_the_known_rate(spacing: str) -> N
     for nodes in (33, 65, 129):
         rod = {**ROD, "nodes": nodes, "spacing": spacing, "start": CLAMPED, "twisting": 0.7, "radius": 0.1}
         simulation = Simulation(scene({"rod": rod}))
-        mechanics, shape = simulation.mechanics, simulation.shape
-        _, moment = mechanics.forces(shape, 0.0)
-        k = banded.dense(mechanics.stiffness(shape, shape, moment, 0.0))[1:, 3, 1:, 3]
-        rate = -np.max(eigvals(k, np.diag(4 * np.pi * 0.01 * mechanics.mesh.volume[1:])).real)
+        system, shape = simulation.system, simulation.configuration
+        _, moment = system.forces(shape, 0.0)
+        k = banded.dense(system.stiffness(shape, shape, moment, 0.0))[1:, 3, 1:, 3]
+        rate = -np.max(eigvals(k, np.diag(4 * np.pi * 0.01 * system.mesh.volume[1:])).real)
         errors.append(abs(rate / (0.7 * np.pi**2 / 4 / (4 * np.pi * 0.01)) - 1))
     assert errors[1] < 1e-3
     assert slopes(errors)[-1] > 1.9
@@ -174,7 +174,7 @@ def test_an_uneven_rod_swims_and_twists_like_an_even_one(spacing: str) -> None:
     for nodes in (33, 65):
         found = run(scene({"rod": wave(nodes, spacing)}, end=0.5, step=0.025))
         at = found.arclength
-        exact = np.stack([np.interp(at, fine.arclength, x) for x in fine.shape.r.T], axis=1)
-        errors.append(rms(found.shape.r - exact))
+        exact = np.stack([np.interp(at, fine.arclength, x) for x in fine.configuration.r.T], axis=1)
+        errors.append(rms(found.configuration.r - exact))
     assert errors[-1] < 1e-3
     assert errors[0] / errors[1] > 3

@@ -45,21 +45,21 @@ def loaded(force: str, m: int, keys: dict[str, Any], derivative: int = 6) -> Sim
         rod |= {"twisting": 1, "radius": 0.1}
     both = {"a": {**rod, "force": force, **keys}, "b": {**rod, "force": force, "position": [0, 1, 0.5], **keys}}
     simulation = Simulation(scene(both))
-    mechanics = simulation.mechanics
+    system = simulation.system
     zero = np.zeros(2 * N)
-    mechanics.law = Linear(np.zeros((2 * N, 2)), zero, (lambda t: zero, lambda t: zero), lambda t: zero)
-    mechanics.stretching = zero
+    system.law = Linear(np.zeros((2 * N, 2)), zero, (lambda t: zero, lambda t: zero), lambda t: zero)
+    system.stretching = zero
     return simulation
 
 
 def bent(simulation: Simulation) -> tuple[Any, np.ndarray]:
     """A start of curved, twisted, unevenly stretched rods, and displacements y (n, m) from it."""
-    mechanics, rng = simulation.mechanics, np.random.default_rng(7)
-    r = simulation.shape.r.copy()
+    system, rng = simulation.system, np.random.default_rng(7)
+    r = simulation.configuration.r.copy()
     s = simulation.arclength[:, None]
     r += 0.2 * np.concatenate([np.sin(2 * s) ** 2, np.sin(3 * s), np.cos(4 * s)], axis=1)
-    start = mechanics.start(r, np.array([0.1, 1.0, 0.3]) + 0.3 * rng.standard_normal(r.shape))
-    y = 0.3 * rng.standard_normal((len(r), mechanics.unknowns))
+    start = system.start(r, np.array([0.1, 1.0, 0.3]) + 0.3 * rng.standard_normal(r.shape))
+    y = 0.3 * rng.standard_normal((len(r), system.unknowns))
     y[:, :3] *= 0.03
     return start, y
 
@@ -71,18 +71,18 @@ def bent(simulation: Simulation) -> tuple[Any, np.ndarray]:
 def test_the_stiffness_of_a_load_is_the_derivative_of_its_force(force: str, m: int, name: str) -> None:
     """Central differences with h = 1e-6 err by h^2 f'''/6 and eps f/h: some 1e-9 of the largest entry here."""
     simulation = loaded(force, m, LOADS[name], derivative=2 if name in ("moment, lab", "tether") else 6)
-    mechanics, (start, y), h = simulation.mechanics, bent(simulation), 1e-6
-    shape = mechanics.move(start, y)
-    applied, moment = mechanics.forces(shape, TIME)
+    system, (start, y), h = simulation.system, bent(simulation), 1e-6
+    shape = system.move(start, y)
+    applied, moment = system.forces(shape, TIME)
     assert np.abs(applied[:N]).max() > 0.01
     assert np.abs(applied[N:]).max() > 0.01
-    exact = banded.dense(mechanics.stiffness(shape, start, moment, TIME))
+    exact = banded.dense(system.stiffness(shape, start, moment, TIME))
     numerical = np.zeros_like(exact)
     for j, c in np.ndindex(y.shape):
         ahead, behind = y.copy(), y.copy()
         ahead[j, c] += h
         behind[j, c] -= h
-        forces = [mechanics.forces(mechanics.move(start, z), TIME)[0] for z in (ahead, behind)]
+        forces = [system.forces(system.move(start, z), TIME)[0] for z in (ahead, behind)]
         numerical[:, :, j, c] = (forces[0] - forces[1]) / (2 * h)
     assert np.abs(exact - numerical).max() <= 1e-7 * np.abs(numerical).max()
     assert (np.abs(numerical).max() > 0.1) == (name in FOLLOWING)
@@ -93,7 +93,7 @@ def test_the_stiffness_of_a_load_is_the_derivative_of_its_force(force: str, m: i
 def test_moments_push_with_no_net_force(force: str, name: str) -> None:
     simulation = loaded(force, 4, LOADS[name])
     start, y = bent(simulation)
-    shape = simulation.mechanics.move(start, y)
-    applied, _ = simulation.mechanics.forces(shape, TIME)
+    shape = simulation.system.move(start, y)
+    applied, _ = simulation.system.forces(shape, TIME)
     for rod in (applied[:N], applied[N:]):
         assert np.abs(rod[:, :3].sum(axis=0)).max() < 1e-14 * np.abs(rod).sum()

@@ -81,7 +81,7 @@ def test_without_a_file_nothing_is_written_and_all_is_known(tmp_path, monkeypatc
     assert result.path is None
     with RunFile(uncut) as file:
         assert np.array_equal(result.series("tip"), file.observables["tip"])
-        assert np.array_equal(result.frame.filaments["rod"].position, file.position()[-1])
+        assert np.array_equal(result.snapshot.filaments["rod"].position, file.position()[-1])
 
 
 def test_progress_is_told_in_a_few_lines_and_changes_nothing(path, uncut):
@@ -111,8 +111,8 @@ def test_observables_made_in_python_are_recorded(path):
     class Height:
         dimension, summary_dimension, description = "length", "length", "greatest height"
 
-        def sample(self, frame):
-            return float(frame.filaments["rod"].position[:, 2].max())
+        def sample(self, snapshot):
+            return float(snapshot.filaments["rod"].position[:, 2].max())
 
         def summary(self, times, samples):
             return float(samples.mean())
@@ -153,10 +153,10 @@ def test_a_run_that_fails_at_its_start_writes_nothing(path):
 
 def test_any_other_error_is_recorded_and_goes_up(path):
     class Broken(FakeSimulation):
-        def frame(self, fields=()):
+        def snapshot(self, fields=()):
             if self.time > 0.2:
                 raise ZeroDivisionError("a fault of the program")
-            return super().frame(fields)
+            return super().snapshot(fields)
 
     with pytest.raises(ZeroDivisionError):
         run(case(), path, build=Broken)
@@ -216,11 +216,11 @@ def test_bad_input_writes_nothing(path):
 class Gliding(FakeSimulation):
     """The tip's height is a given function of time: a straight line down from 1, flat from 0.6 on."""
 
-    def frame(self, fields=()):
+    def snapshot(self, fields=()):
         kept, self.y = self.y, np.full(len(self.y), max(1 - self.time, 0.4))
-        frame = super().frame(fields)
+        snapshot = super().snapshot(fields)
         self.y = kept
-        return frame
+        return snapshot
 
 
 HEIGHT = '[observe.height]\nkind = "position"\nalong = [0, 1, 0]\n[[stop]]\nobserve = "height"\n'

@@ -43,9 +43,9 @@ def scene(tmp_path, copies: str, more: str = ""):
 def test_a_row_of_places_all_the_same_way(tmp_path, heading):
     (tmp_path / "places.csv").write_text(heading + ROWS)
     case = scene(tmp_path, '{ file = "places.csv", orientation = "same" }')
-    frame = Simulation(case).frame()
-    assert list(frame.filaments) == ["hair_000", "hair_001", "hair_002"]
-    for filament, place in zip(frame.filaments.values(), PLACES, strict=True):
+    snapshot = Simulation(case).snapshot()
+    assert list(snapshot.filaments) == ["hair_000", "hair_001", "hair_002"]
+    for filament, place in zip(snapshot.filaments.values(), PLACES, strict=True):
         along = np.linspace(0.0, 1.0, 9)[:, None] * [0.0, 0.0, 1.0]
         assert np.allclose(filament.position, place + along, atol=1e-14)
         assert np.allclose(filament.e1, [0.0, 1.0, 0.0], atol=1e-14)
@@ -53,8 +53,8 @@ def test_a_row_of_places_all_the_same_way(tmp_path, heading):
 
 def test_random_places_all_the_same_way(tmp_path):
     copies = "{{ count = 5, seed = 4, region = [[-1, -1, -1], [1, 1, 1]]{} }}"
-    same = Simulation(scene(tmp_path, copies.format(', orientation = "same"'))).frame().filaments
-    turned = Simulation(scene(tmp_path, copies.format(""))).frame().filaments
+    same = Simulation(scene(tmp_path, copies.format(', orientation = "same"'))).snapshot().filaments
+    turned = Simulation(scene(tmp_path, copies.format(""))).snapshot().filaments
     for name, filament in same.items():
         assert np.allclose(filament.position[-1] - filament.position[0], [0, 0, 1], atol=1e-14)
         assert np.array_equal(filament.position[0], turned[name].position[0])  # the same seed, the same places
@@ -86,7 +86,7 @@ def test_one_copy_is_observed_by_its_name(tmp_path):
     (tmp_path / "places.csv").write_text(ROWS)
     case = scene(tmp_path, '{ file = "places.csv", orientation = "same" }', TIP.format(name="hair_001"))
     result = run(case, progress=False, log=lambda line: None)
-    last = result.frame.filaments["hair_001"].position[-1]
+    last = result.snapshot.filaments["hair_001"].position[-1]
     assert repr(result).startswith("<Result finished: ")
     assert "t = 0.01; tip = [" in repr(result)
     assert np.array_equal(result.summaries["tip"].value, last)
@@ -125,4 +125,4 @@ def test_another_filament_has_another_name(tmp_path, name, clashes):
         with pytest.raises(CaseError, match=r"filament\.hair_001: found the name of a copy of hair; allowed: another"):
             scene(tmp_path, copies, more)
     else:
-        assert len(Simulation(scene(tmp_path, copies, more)).frame().filaments) == 4
+        assert len(Simulation(scene(tmp_path, copies, more)).snapshot().filaments) == 4

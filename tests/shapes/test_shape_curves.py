@@ -23,8 +23,10 @@ def test_frame_equations_are_integrated_to_sixth_order() -> None:
 
 
 def test_frames_stay_orthonormal_over_many_turns() -> None:
-    _, frame = integrate_frame(lambda s: np.tile([300.0, 0.0, 400.0], (s.size, 1)), np.linspace(0.0, 1.0, 200))
-    np.testing.assert_allclose(frame.transpose(0, 2, 1) @ frame, np.broadcast_to(np.eye(3), (200, 3, 3)), atol=1e-12)
+    _, snapshot = integrate_frame(lambda s: np.tile([300.0, 0.0, 400.0], (s.size, 1)), np.linspace(0.0, 1.0, 200))
+    np.testing.assert_allclose(
+        snapshot.transpose(0, 2, 1) @ snapshot, np.broadcast_to(np.eye(3), (200, 3, 3)), atol=1e-12
+    )
 
 
 def test_formula_of_an_arc_is_that_arc() -> None:

@@ -59,7 +59,7 @@ def test_the_last_output_is_the_default_and_the_key_that_place_are_idle(tmp_path
     case = ibfil.parse_case(BENT, str(tmp_path / "next.toml"), ['filament.rod.shape={kind="run", path="whole.h5"}'])
     assert idle_keys(case) == ["filament.rod.direction"]
     with ibfil.open(tmp_path / "whole.h5") as run:
-        assert np.array_equal(Simulation(case).shape.r, run.position()[-1])
+        assert np.array_equal(Simulation(case).configuration.r, run.position()[-1])
 
 
 @pytest.mark.parametrize("scheme", [[], ["thermal={energy=1e-4}", "time.step=1e-4"]], ids=["still", "thermal"])
@@ -78,21 +78,23 @@ def test_clamps_hold_the_tangents_of_the_other_run(tmp_path, scheme):
     before = Simulation(ibfil.parse_case(BENT, "a.toml", [*clamps, *scheme]))
     more = [*clamps[:2], *clamps[3:], *scheme, from_run("a.h5")]
     taken = Simulation(ibfil.parse_case(BENT, str(tmp_path / "b.toml"), more))
-    np.testing.assert_allclose(taken.shape.e3[[0, -1]], before.shape.e3[[0, -1]], atol=1e-9)
+    np.testing.assert_allclose(taken.configuration.e3[[0, -1]], before.configuration.e3[[0, -1]], atol=1e-9)
     with ibfil.open(tmp_path / "a.h5") as run:
-        np.testing.assert_allclose(taken.shape.e1, run.filaments["rod"]["e1"][-1], atol=1e-9)
-        np.testing.assert_allclose(taken.shape.bend, run.filaments["rod"]["strain"][-1, :, :2], atol=1e-6)
+        np.testing.assert_allclose(taken.configuration.e1, run.filaments["rod"]["e1"][-1], atol=1e-9)
+        np.testing.assert_allclose(taken.configuration.bend, run.filaments["rod"]["strain"][-1, :, :2], atol=1e-6)
 
 
 def test_other_nodes_lie_on_the_curve_through_its_nodes(tmp_path):
     quietly(BENT, tmp_path / "a.h5", 'filament.rod.shape={kind="circle", curvature=2.0}')
-    arc = Simulation(ibfil.parse_case(BENT, "a.toml", ['filament.rod.shape={kind="circle", curvature=2.0}'])).shape
+    arc = Simulation(
+        ibfil.parse_case(BENT, "a.toml", ['filament.rod.shape={kind="circle", curvature=2.0}'])
+    ).configuration
     centre = arc.r[0] + 0.5 * np.cross(arc.e1[0], arc.e3[0])
     assert np.abs(np.linalg.norm(arc.r - centre, axis=1) - 0.5).max() < 1e-7
     errors = []
     for nodes in (41, 33):
         more = [from_run("a.h5", "0"), f"filament.rod.nodes={nodes}"]
-        shape = Simulation(ibfil.parse_case(BENT, str(tmp_path / "b.toml"), more)).shape
+        shape = Simulation(ibfil.parse_case(BENT, str(tmp_path / "b.toml"), more)).configuration
         errors.append(np.abs(np.linalg.norm(shape.r - centre, axis=1) - 0.5).max())
     assert 1e-7 < max(errors) < 0.05**4  # of a cubic spline on nodes 0.05 apart: 2^3/24 h^4 at its ends
 
@@ -131,7 +133,7 @@ def test_a_copy_can_be_taken_up(tmp_path):
     change = from_run("a.h5").replace("filament.rod", "filament.rod_001")
     taken = Simulation(ibfil.parse_case(single, str(tmp_path / "b.toml"), [change]))
     with ibfil.open(tmp_path / "a.h5") as run:
-        assert np.array_equal(taken.shape.r, run.position("rod_001")[-1])
+        assert np.array_equal(taken.configuration.r, run.position("rod_001")[-1])
 
 
 def test_a_run_is_not_gone_on_with_when_its_start_has_changed(tmp_path):

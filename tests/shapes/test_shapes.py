@@ -132,8 +132,8 @@ def test_varying_strains_agree_with_the_frame_equations_integrated_another_way()
         return np.array([4.0 * np.sin(5.0 * s), 1.0 + s**2, 3.0 * np.cos(2.0 * s)])
 
     def rates(s: float, y: np.ndarray) -> np.ndarray:
-        frame = y[3:].reshape(3, 3)  # rows e1, e2, e3
-        return np.concatenate((frame[2], np.cross(strains(s) @ frame, frame).ravel()))
+        snapshot = y[3:].reshape(3, 3)  # rows e1, e2, e3
+        return np.concatenate((snapshot[2], np.cross(strains(s) @ snapshot, snapshot).ravel()))
 
     filament = rod(
         length=2.0,

@@ -47,8 +47,8 @@ def ran(*overrides: str, twist: str = "") -> Result:
 @pytest.mark.parametrize("method", ["table", "fft", "krylov"])
 def test_both_sides_are_one_number_in_stokes(method):
     """To 1e-10; and what slips is s F^2, s = eps (h/2 Lc)/(6 pi eta a) with the point radius a = 1.313 h."""
-    frame = ran(f"fluid.method={method}").frame
-    found, force = frame.diagnostics, frame.filaments["rod"].force
+    snapshot = ran(f"fluid.method={method}").snapshot
+    found, force = snapshot.diagnostics, snapshot.filaments["rod"].force
     assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
     volume = 0.1 * np.array([0.5, *np.ones(9), 0.5])[:, None]
     slip = 0.01 * (0.125 / (2 * volume)) / (6 * np.pi * 0.7 * 1.313 * 0.125)
@@ -60,19 +60,19 @@ def test_with_the_slip_it_is_all_that_the_nodes_do(keys, twist):
     """But for the places it is taken at, the mobility's of a step and those at its end: second order in the step."""
     left = []
     for step in (1e-3, 5e-4, 2.5e-4):
-        found = ran(*keys, f"time.step={step}", twist=twist).frame.diagnostics
+        found = ran(*keys, f"time.step={step}", twist=twist).snapshot.diagnostics
         left.append(found["power"] / (found["grid_power"] + found["slip_power"]) - 1)
     assert min(slopes(left)) > 1.9
 
 
 def test_without_slip_it_has_no_share():
-    found = ran("fluid.slip=0").frame.diagnostics
+    found = ran("fluid.slip=0").snapshot.diagnostics
     assert found["slip_power"] == 0.0
     assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
 
 
 def test_torques_on_the_grid_do_work_too():
-    found = ran("fluid.rotation=grid", twist=TWISTED).frame.diagnostics
+    found = ran("fluid.rotation=grid", twist=TWISTED).snapshot.diagnostics
     assert found["dissipation"] == pytest.approx(found["grid_power"], rel=1e-10)
 
 
@@ -96,23 +96,23 @@ def test_the_gradient_is_that_of_the_field_itself():
 
 
 def test_drag_turns_into_heat_what_the_flow_does_not_carry():
-    assert ran("fluid.model=rft").frame.diagnostics["dissipation"] == pytest.approx(
-        ran("fluid.model=rft").frame.diagnostics["power"]
+    assert ran("fluid.model=rft").snapshot.diagnostics["dissipation"] == pytest.approx(
+        ran("fluid.model=rft").snapshot.diagnostics["power"]
     )
-    stream = ran("fluid.model=rft", "fluid.flow=[3, 0, 0]").frame.diagnostics
-    still = ran("fluid.model=rft").frame.diagnostics
+    stream = ran("fluid.model=rft", "fluid.flow=[3, 0, 0]").snapshot.diagnostics
+    still = ran("fluid.model=rft").snapshot.diagnostics
     assert stream["dissipation"] == pytest.approx(still["dissipation"], rel=1e-6)  # Galileo
 
 
 def test_a_rod_that_does_not_give_way_heats_the_flow_along_it():
     """zeta_par (gamma x)^2 per length of a straight rod held by its stiffness in u = gamma (-x, y, 0)."""
     straight = ["filament.rod.shape={kind='straight'}", "filament.rod.stretching=1e6"]
-    frame = ran("fluid.model=rft", "fluid.flow=['-2*x', '2*y', 0]", *straight).frame
+    snapshot = ran("fluid.model=rft", "fluid.flow=['-2*x', '2*y', 0]", *straight).snapshot
     s, lc = np.linspace(-0.5, 0.5, 11), 0.1 * np.array([0.5, *np.ones(9), 0.5])
     expected = np.sum(lc * 2 * np.pi * 0.7 * (2 * s) ** 2)
     # It is shortened by the drag of half of it over EA, zeta_par gamma L^2/8 EA, and moves until it is.
-    assert frame.diagnostics["dissipation"] == pytest.approx(expected, rel=1e-5)
-    assert abs(frame.diagnostics["power"]) < 1e-5 * expected
+    assert snapshot.diagnostics["dissipation"] == pytest.approx(expected, rel=1e-5)
+    assert abs(snapshot.diagnostics["power"]) < 1e-5 * expected
 
 
 def test_inertia_keeps_the_rest_as_the_energy_of_the_flow():
@@ -124,12 +124,12 @@ def test_inertia_keeps_the_rest_as_the_energy_of_the_flow():
         times, gained = [0.0], [0.0]
 
         def look(simulation=simulation, times=times, gained=gained) -> None:
-            found = simulation.frame().diagnostics
+            found = simulation.snapshot().diagnostics
             times.append(simulation.time)
             gained.append(found["grid_power"] - found["dissipation"])
 
         simulation.advance(0.01, look)
-        flow = simulation.frame(("velocity",)).grid["velocity"].astype(float)
+        flow = simulation.snapshot(("velocity",)).grid["velocity"].astype(float)
         energy = 0.5 * 10 * np.sum(flow**2) * 0.125**3
         left.append(abs(np.trapezoid(gained, times) / energy - 1))
     assert min(slopes(left)) > 1.8
@@ -140,4 +140,4 @@ def test_it_is_an_observable_and_costs_nothing_where_it_is_not_named():
     result = ran()
     assert float(result.summaries["heat"].value) > 0
     silent = parse_case(SCENE.replace("TWIST", "").split("[observe")[0], "scene.toml")
-    assert "dissipation" not in run(silent, progress=False, log=lambda line: None).frame.diagnostics
+    assert "dissipation" not in run(silent, progress=False, log=lambda line: None).snapshot.diagnostics

@@ -39,10 +39,10 @@ every = "pi/100"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def result(tmp_path_factory):
     folder = tmp_path_factory.mktemp("compare")
     fluids = ("rft", "matched", "stokes", "navier-stokes")
-    return compare(SWIMMER, fluids, folder, say=lambda line: None), folder
+    return compare(SWIMMER, fluids, folder, log=lambda line: None), folder
 
 
 def test_every_fluid_of_the_schema_can_be_asked_for():
@@ -55,8 +55,8 @@ def test_every_fluid_of_the_schema_can_be_asked_for():
     assert fluid_overrides("rft", case) == ("fluid.model=rft",)
 
 
-def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(made):
-    comparison, folder = made
+def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(result):
+    comparison, folder = result
     by = {column.fluid: column.numbers for column in comparison.columns}
     assert comparison.window.count == 1
     assert comparison.window.period == pytest.approx(2 * np.pi / 10, rel=1e-4)
@@ -84,14 +84,14 @@ def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(made):
     with open(folder / "compare.csv", newline="") as file:
         rows = {row["quantity"]: row for row in csv.DictReader(file)}
     assert float(rows["speed"]["matched"]) == by["matched"]["speed"].value
-    told = json.loads((folder / "compare.json").read_text())
-    assert [one["fluid"] for one in told["fluids"]] == list(by)
-    assert told["machine"]
+    message = json.loads((folder / "compare.json").read_text())
+    assert [one["fluid"] for one in message["fluids"]] == list(by)
+    assert message["machine"]
     assert (folder / "compare.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_it_says_what_each_fluid_models_alone_and_what_that_takes(made):
-    comparison, _ = made
+def test_it_says_what_each_fluid_models_alone_and_what_that_takes(result):
+    comparison, _ = result
     own = {column.fluid: column.own for column in comparison.columns}
     assert any("inertia" in line for line in own["navier-stokes"])
     assert not any("inertia" in line for line in own["stokes"])
@@ -180,4 +180,4 @@ def test_what_cannot_be_compared_is_refused(tmp_path, fluids):
 def test_where_no_run_ends_there_is_nothing_to_compare(tmp_path):
     wild = ["time.scheme=explicit", "time.step=0.01", "filament.rod.stretching=1e7"]
     with pytest.raises(RunFailed, match="no fluid's run came to an end"):
-        compare(SWIMMER, ("rft", "stokes"), tmp_path, wild, say=lambda line: None)
+        compare(SWIMMER, ("rft", "stokes"), tmp_path, wild, log=lambda line: None)

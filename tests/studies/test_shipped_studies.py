@@ -47,8 +47,8 @@ def test_there_are_results_of_every_study():
 
 @pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
 def test_what_was_measured_says_when_with_what_and_where(path):
-    told = json.loads(path.read_text())
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d", told["date"])
-    assert {"ibfil", "python", "numpy"} <= set(told["versions"])
-    assert "cores" in told["machine"]
+    message = json.loads(path.read_text())
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", message["date"])
+    assert {"ibfil", "python", "numpy"} <= set(message["versions"])
+    assert "cores" in message["machine"]
     assert not re.search(r'"[^"]*/(tmp|home|work)/', path.read_text())

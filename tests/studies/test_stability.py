@@ -63,21 +63,21 @@ def quiet(line: str) -> None:
 
 def test_without_slip_nodes_half_a_cell_apart_lock_and_with_it_they_do_not(tmp_path):
     axes = [axis("fluid.slip=0,0.01"), axis("fluid.cells=[16,16,16],[32,32,32]")]
-    made = stability_study.stability(WAVE, axes, tmp_path, say=quiet)
-    kinds = {(one.setting.values["fluid.slip"], one.setting.values["fluid.cells"]): one for one in made.cells}
+    result = stability_study.stability(WAVE, axes, tmp_path, log=quiet)
+    kinds = {(one.setting.values["fluid.slip"], one.setting.values["fluid.cells"]): one for one in result.cells}
     locked = kinds["0", "[16,16,16]"]
     assert (locked.kind, locked.predicted) == ("locked", "locked")
     for key in (("0", "[32,32,32]"), ("0.01", "[16,16,16]"), ("0.01", "[32,32,32]")):
         assert (kinds[key].kind, kinds[key].predicted) == ("stable", ""), key
-    assert made.foretold == 4
+    assert result.foretold == 4
 
 
 def test_too_long_a_step_is_wrong_and_that_is_predicted(tmp_path):
     """Steps of 2 and of 0.2 radians of the wave, taken whole, as outputs are further apart."""
     two = ["fluid.model=rft", "time.end=1.2", "output.every=0.6"]
-    made = stability_study.stability(WAVE, [axis("time.step=0.2,0.02")], tmp_path, two, say=quiet)
-    assert [(one.kind, one.predicted) for one in made.cells] == [("wrong", "wrong"), ("stable", "")]
-    assert made.foretold == 2
+    result = stability_study.stability(WAVE, [axis("time.step=0.2,0.02")], tmp_path, two, log=quiet)
+    assert [(one.kind, one.predicted) for one in result.cells] == [("wrong", "wrong"), ("stable", "")]
+    assert result.foretold == 2
 
 
 def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):
@@ -101,9 +101,9 @@ def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):
     with open("out/stability.csv", newline="") as file:
         kinds = [row["class"] for row in csv.DictReader(file)]
     assert kinds == ["diverged", "stable", "stable", "stable", "diverged", "diverged", "diverged", "stable"]
-    told = json.loads((here / "out/stability.json").read_text())
-    assert told["limits"]["stretch"] == 0.02
-    assert told["machine"]
+    message = json.loads((here / "out/stability.json").read_text())
+    assert message["limits"]["stretch"] == 0.02
+    assert message["machine"]
     assert (here / "out/stability.png").read_bytes().startswith(b"\x89PNG")
     runs, finer = ({path.name for path in (here / "out" / of).glob("*.h5")} for of in ("runs", "finer"))
     assert len(finer) == 2  # explicit steps share the finer run of their nodes
@@ -112,7 +112,7 @@ def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):
 
 def test_what_cannot_be_judged_is_refused_or_told(tmp_path):
     with pytest.raises(CaseError, match="thermal noise"):
-        stability_study.stability(BENT + "\n[thermal]\nenergy = 1e-3\n", [axis("time.step=1e-3")], tmp_path, say=quiet)
-    made = stability_study.stability(BENT, [axis("filament.rod.nodes=9,2")], tmp_path, say=quiet)
-    assert [one.kind for one in made.cells] == ["stable", "diverged"]
-    assert "nodes" in made.cells[1].message
+        stability_study.stability(BENT + "\n[thermal]\nenergy = 1e-3\n", [axis("time.step=1e-3")], tmp_path, log=quiet)
+    result = stability_study.stability(BENT, [axis("filament.rod.nodes=9,2")], tmp_path, log=quiet)
+    assert [one.kind for one in result.cells] == ["stable", "diverged"]
+    assert "nodes" in result.cells[1].message

@@ -41,7 +41,7 @@ def statuses(outcomes: list[Outcome]) -> dict[str, str]:
 
 def test_each_member_is_the_run_of_its_case(tmp_path, said):
     """The same bits as `ibfil run` of the same case; in the order given."""
-    outcomes = run_members([STIFF, GOOD], tmp_path / "study", say=said.append)
+    outcomes = run_members([STIFF, GOOD], tmp_path / "study", log=said.append)
     assert statuses(outcomes) == {"stiff": "finished", "good": "finished"}
     assert [outcome.member for outcome in outcomes] == [STIFF, GOOD]
     for outcome in outcomes:
@@ -53,8 +53,8 @@ def test_each_member_is_the_run_of_its_case(tmp_path, said):
 
 
 def test_in_processes_it_is_bit_for_bit_the_same_and_a_failure_stays_alone(tmp_path, said):
-    here = run_members([GOOD, BAD, ODD, STIFF], tmp_path / "here", say=said.append)
-    there = run_members([GOOD, BAD, ODD, STIFF], tmp_path / "there", jobs=2, say=said.append)
+    here = run_members([GOOD, BAD, ODD, STIFF], tmp_path / "here", log=said.append)
+    there = run_members([GOOD, BAD, ODD, STIFF], tmp_path / "there", jobs=2, log=said.append)
     wanted = {"good": "finished", "bad": "failed", "odd": "failed", "stiff": "finished"}
     assert statuses(here) == statuses(there) == wanted
     for a, b in zip(here, there, strict=True):
@@ -69,11 +69,11 @@ def test_in_processes_it_is_bit_for_bit_the_same_and_a_failure_stays_alone(tmp_p
 
 
 def test_what_is_done_or_known_to_fail_is_not_run_again(tmp_path, said, monkeypatch):
-    run_members([GOOD, BAD], tmp_path, say=said.append)
+    run_members([GOOD, BAD], tmp_path, log=said.append)
     before = {path: path.read_bytes() for path in tmp_path.glob("*.h5")}
     monkeypatch.setattr(module, "_run", lambda case, path: pytest.fail("run again"))
     said.clear()
-    outcomes = run_members([GOOD, BAD], tmp_path, say=said.append)
+    outcomes = run_members([GOOD, BAD], tmp_path, log=said.append)
     assert statuses(outcomes) == {"good": "finished", "bad": "failed"}
     assert all(outcome.seconds == 0 for outcome in outcomes)
     assert {path: path.read_bytes() for path in tmp_path.glob("*.h5")} == before
@@ -82,21 +82,21 @@ def test_what_is_done_or_known_to_fail_is_not_run_again(tmp_path, said, monkeypa
 
 
 def test_a_file_of_another_case_is_computed_anew_and_that_is_told(tmp_path, said):
-    run_members([GOOD], tmp_path, say=said.append)
+    run_members([GOOD], tmp_path, log=said.append)
     changed = Member("good", BENT, ("fluid.viscosity=3",))
-    (outcome,) = run_members([changed], tmp_path, say=said.append)
+    (outcome,) = run_members([changed], tmp_path, log=said.append)
     assert any("fluid.viscosity" in line and "anew" in line for line in said)
     with RunFile(outcome.path) as file:
         assert file.case.fluid.viscosity == 3.0
     renamed = Member("good", BENT.replace('title = "', 'title = "again: '), ("fluid.viscosity=3",))
-    (outcome,) = run_members([renamed], tmp_path, say=said.append)
+    (outcome,) = run_members([renamed], tmp_path, log=said.append)
     assert outcome.seconds == 0  # what a case is called changes no result
 
 
 def test_a_damaged_file_is_computed_anew(tmp_path, said):
-    (outcome,) = run_members([GOOD], tmp_path, say=said.append)
+    (outcome,) = run_members([GOOD], tmp_path, log=said.append)
     outcome.path.write_bytes(outcome.path.read_bytes()[:2000])
-    (outcome,) = run_members([GOOD], tmp_path, say=said.append)
+    (outcome,) = run_members([GOOD], tmp_path, log=said.append)
     assert outcome.status == "finished"
     assert any("damaged" in line for line in said)
 
@@ -125,7 +125,7 @@ class Pickling(Executor):
 
 def test_any_executor_can_be_handed_in(tmp_path, said):
     far = Pickling()
-    outcomes = run_members([GOOD, ODD], tmp_path, executor=far, say=said.append)
+    outcomes = run_members([GOOD, ODD], tmp_path, executor=far, log=said.append)
     assert statuses(outcomes) == {"good": "finished", "odd": "failed"}
     assert far.sent == 1  # what cannot be read is not sent
     assert work(GOOD, str(tmp_path)).seconds == 0  # and again does nothing
@@ -172,7 +172,7 @@ def test_after_a_signal_everything_can_be_gone_on_with(tmp_path, jobs, said):
     with RunFile(begun[0]) as file:
         assert file.status == "interrupted"
         created = file.created
-    (outcome,) = run_members([Member("one", BENT, LONG)], folder, say=said.append)
+    (outcome,) = run_members([Member("one", BENT, LONG)], folder, log=said.append)
     assert outcome.status == "finished"
     with RunFile(outcome.path) as file:
         assert file.created == created  # gone on with, not begun anew
@@ -183,7 +183,7 @@ def test_after_a_signal_everything_can_be_gone_on_with(tmp_path, jobs, said):
 
 def test_a_process_that_is_killed_is_told_and_the_others_go_on(tmp_path, said):
     """The run that shot its own process down is named; nothing else is lost."""
-    outcomes = run_members([GOOD, Killer("killer", BENT), STIFF], tmp_path, jobs=2, say=said.append)
+    outcomes = run_members([GOOD, Killer("killer", BENT), STIFF], tmp_path, jobs=2, log=said.append)
     assert statuses(outcomes) == {"good": "finished", "killer": "failed", "stiff": "finished"}
     assert "was killed" in outcomes[1].message
 
@@ -215,12 +215,12 @@ def test_ctrl_c_before_the_first_step_is_no_failure(tmp_path, monkeypatch, said)
 
     monkeypatch.setattr(module, "_run", cut)
     with pytest.raises(Interrupted, match="0 of 2 runs are done"):
-        run_members([GOOD, STIFF], tmp_path, say=said.append)
+        run_members([GOOD, STIFF], tmp_path, log=said.append)
 
 
 def test_a_process_pool_can_be_handed_in(tmp_path, said):
     """One of concurrent.futures itself, whose processes begin with nothing of this one."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        outcomes = run_members([GOOD, ODD, STIFF], tmp_path, executor=pool, say=said.append)
+        outcomes = run_members([GOOD, ODD, STIFF], tmp_path, executor=pool, log=said.append)
     assert statuses(outcomes) == {"good": "finished", "odd": "failed", "stiff": "finished"}
     assert all(outcome.path.is_file() for outcome in outcomes if outcome.done)

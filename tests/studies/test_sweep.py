@@ -71,9 +71,9 @@ def test_a_sweep_makes_a_table_of_all_observables_and_tells_what_failed(here, ca
             assert run.case.time.end == 0.01
             assert float(row["span"]) == float(run.observables["span"][-1])
     assert rows[0]["span"] != rows[2]["span"]
-    told = json.loads((here / "bent-sweep/sweep.json").read_text())
-    assert told["machine"]
-    assert [one["status"] for one in told["runs"]] == [row["status"] for row in rows]
+    message = json.loads((here / "bent-sweep/sweep.json").read_text())
+    assert message["machine"]
+    assert [one["status"] for one in message["runs"]] == [row["status"] for row in rows]
 
 
 def test_as_a_job_array_each_index_is_one_run_and_the_table_comes_after(here, capsys):
@@ -100,7 +100,7 @@ def test_a_sweep_whose_case_is_at_fault_in_every_form_writes_nothing(here, capsy
 
 
 def test_from_python(tmp_path):
-    rows = sweep(BENT, [axis_of("fluid.viscosity", [1.0, 2.0])], tmp_path, ["time.end=0.01"], say=lambda line: None)
+    rows = sweep(BENT, [axis_of("fluid.viscosity", [1.0, 2.0])], tmp_path, ["time.end=0.01"], log=lambda line: None)
     assert [row.setting.values["fluid.viscosity"] for row in rows] == ["1.0", "2.0"]
     assert all(row.outcome.done and row.numbers["span"] > 0 for row in rows)
 

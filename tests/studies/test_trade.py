@@ -32,7 +32,7 @@ def quiet(line: str) -> None:
 
 
 def runner(members, folder):
-    return run_members(members, folder, say=quiet)
+    return run_members(members, folder, log=quiet)
 
 
 @pytest.fixture(scope="module")
@@ -80,15 +80,15 @@ def test_a_reference_without_its_order_is_refused(tmp_path, monkeypatch):
         assert found.proofs["position"][0].order == pytest.approx(np.log2(ratio))
     monkeypatch.setattr(reference, "distances", lambda a, b: {"position": 1.0})
     with pytest.raises(RunFailed, match="shows its order in none"):
-        trade(BENT, [axis("time.step=1e-3")], tmp_path, observe=["position"], say=quiet)
+        trade(BENT, [axis("time.step=1e-3")], tmp_path, observe=["position"], log=quiet)
 
 
 def test_thermal_and_adaptive_cases_have_no_reference(tmp_path):
     with pytest.raises(CaseError, match=r"time\.tolerance"):
-        trade(BENT, [axis("time.order=1,2")], tmp_path, ["time.tolerance=1e-2"], say=quiet)
+        trade(BENT, [axis("time.order=1,2")], tmp_path, ["time.tolerance=1e-2"], log=quiet)
     noisy = BENT + "\n[thermal]\nenergy = 1e-3\n"
     with pytest.raises(CaseError, match=r"semi-implicit|random run"):
-        trade(noisy, [axis("time.step=1e-3,2e-3")], tmp_path, say=quiet)
+        trade(noisy, [axis("time.step=1e-3,2e-3")], tmp_path, log=quiet)
 
 
 def test_the_front_is_what_nothing_beats():
@@ -121,10 +121,10 @@ def test_a_trade_has_a_table_a_figure_and_ends_with_the_cheapest(here, capsys):
     with open("out/trade.csv", newline="") as file:
         by_processor = next(row for row in csv.DictReader(file) if row["time.step"] == "1e-3")
     assert float(by_processor["seconds"]) == float(by_processor["processor"]) <= processor / covered
-    told = json.loads((here / "out/trade.json").read_text())
-    assert told["machine"]
-    assert told["versions"]["ibfil"]
-    assert [len(one["seconds"]) for one in told["settings"] if one["status"] == "finished"] == [2, 2]
+    message = json.loads((here / "out/trade.json").read_text())
+    assert message["machine"]
+    assert message["versions"]["ibfil"]
+    assert [len(one["seconds"]) for one in message["settings"] if one["status"] == "finished"] == [2, 2]
     assert (here / "out/trade.png").read_bytes().startswith(b"\x89PNG")
     assert main.main([*command, "--for", "1e-12"]) == 1  # nothing is so good
     err = capsys.readouterr().err
@@ -139,7 +139,7 @@ IMPLICIT = ["time.scheme=implicit", "time.order=1"]
 def test_the_budget_ends_it_and_the_same_call_goes_on(tmp_path):
     """The alarm is set off by hand when the first of two settings is done: the other is left out, and made later."""
     with pytest.raises(Interrupted, match="budget was used up by the reference"):
-        trade(BENT, [axis("time.step=1e-3")], tmp_path / "none", budget=1e-3, say=quiet)
+        trade(BENT, [axis("time.step=1e-3")], tmp_path / "none", budget=1e-3, log=quiet)
     said: list[str] = []
 
     def ring(line: str) -> None:
@@ -148,12 +148,12 @@ def test_the_budget_ends_it_and_the_same_call_goes_on(tmp_path):
             signal.raise_signal(signal.SIGALRM)
 
     two = [axis("time.step=1e-3,5e-4")]
-    made = trade(BENT, two, tmp_path, repeat=1, budget=1e6, observe=["position"], say=ring)
-    assert [one.status for one in made.tried] == ["finished", "left out"]
+    result = trade(BENT, two, tmp_path, repeat=1, budget=1e6, observe=["position"], log=ring)
+    assert [one.status for one in result.trials] == ["finished", "left out"]
     assert any("budget" in line for line in said)
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
-    made = trade(BENT, two, tmp_path, repeat=1, observe=["position"], say=quiet)
-    assert [one.status for one in made.tried] == ["finished", "finished"]
+    result = trade(BENT, two, tmp_path, repeat=1, observe=["position"], log=quiet)
+    assert [one.status for one in result.trials] == ["finished", "finished"]
 
 
 def test_a_budget_whose_interrupt_is_lost_ends_with_the_run_under_way(tmp_path, monkeypatch):
@@ -164,26 +164,28 @@ def test_a_budget_whose_interrupt_is_lost_ends_with_the_run_under_way(tmp_path, 
         if line.startswith("step=1e-3.1: finished"):
             signal.raise_signal(signal.SIGALRM)
 
-    made = trade(BENT, [axis("time.step=1e-3,5e-4")], tmp_path, repeat=1, budget=1e6, observe=["position"], say=ring)
-    assert [one.status for one in made.tried] == ["finished", "left out"]
+    result = trade(BENT, [axis("time.step=1e-3,5e-4")], tmp_path, repeat=1, budget=1e6, observe=["position"], log=ring)
+    assert [one.status for one in result.trials] == ["finished", "left out"]
 
 
 def test_what_the_reference_cannot_tell_is_marked_and_counts_against_a_setting(tmp_path):
-    made = trade(BENT, [axis("time.step=1e-3,1.25e-4")], tmp_path, repeat=1, say=quiet, observe=["position"])
-    coarse, fine = made.tried
-    assert made.uncertain(fine, "position") or fine.errors["position"] < coarse.errors["position"]
-    own = made.reference.estimate("position")
-    assert made.cheapest(coarse.errors["position"] + 1.01 * own) is not None
+    result = trade(BENT, [axis("time.step=1e-3,1.25e-4")], tmp_path, repeat=1, log=quiet, observe=["position"])
+    coarse, fine = result.trials
+    assert result.uncertain(fine, "position") or fine.errors["position"] < coarse.errors["position"]
+    own = result.reference.estimate("position")
+    assert result.cheapest(coarse.errors["position"] + 1.01 * own) is not None
     exact = replace(coarse, errors={"position": 0.0})
-    assert replace(made, tried=(exact,)).cheapest(0.9 * own) is None
+    assert replace(result, trials=(exact,)).cheapest(0.9 * own) is None
 
 
 def test_one_setting_alone_has_room_in_the_figure(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(trade_figure, "save", lambda figure, path: drawn.append(figure))
-    made = trade(BENT, [axis("time.step=1e-3")], tmp_path, repeat=1, observe=["position"], say=quiet)
+    result = trade(BENT, [axis("time.step=1e-3")], tmp_path, repeat=1, observe=["position"], log=quiet)
     for seconds in (0.08, 3.0, 5.0, 12.0):
-        trade_figure.draw(replace(made, tried=(replace(made.tried[0], seconds=(seconds,)),)), tmp_path / "trade.png")
+        trade_figure.draw(
+            replace(result, trials=(replace(result.trials[0], seconds=(seconds,)),)), tmp_path / "trade.png"
+        )
         low, high = drawn[-1].axes[0].get_xlim()
         assert low < 0.9 * seconds
         assert 1.1 * seconds < high

@@ -71,13 +71,13 @@ def test_bending_and_stretching_modes_have_half_kt_each_at_any_step(end, lam_dt)
     dt = lam_dt / bent.rates.min()
     rod = {**ROD, "nodes": nodes, "stretching": stretching, "start": {"end": end}}
     simulation = many(rod, rods, energy, dt)
-    rest = simulation.shape.r.reshape(rods, nodes, 3)
+    rest = simulation.configuration.r.reshape(rods, nodes, 3)
     settle, steps = np.max([bent.needed(dt, 2 * rods, 0.1), stretched.needed(dt, rods, 0.1)], axis=0)
     walk(simulation, settle)
     series = np.empty((steps, rods, nodes, 3))
     for k in range(steps):
         walk(simulation, 1)
-        series[k] = simulation.shape.r.reshape(rods, nodes, 3) - rest
+        series[k] = simulation.configuration.r.reshape(rods, nodes, 3) - rest
     series = series[:, :, free] / np.sqrt(energy)
     across = np.concatenate([series[..., 1], series[..., 2]], axis=1)
     bent.check(across @ bent.rows.T, dt)
@@ -99,7 +99,7 @@ def test_twist_modes_have_half_kt_each(lam_dt):
     series = np.empty((steps, rods, nodes - 1))
     for k in range(steps):
         walk(simulation, 1)
-        series[k] = simulation.shape.twist.reshape(rods, nodes)[:, :-1]
+        series[k] = simulation.configuration.twist.reshape(rods, nodes)[:, :-1]
     angles = np.concatenate([np.zeros((steps, rods, 1)), np.cumsum(series * ds, axis=2)], axis=2) / np.sqrt(energy)
     modes.check(angles @ modes.rows.T, dt)
 
@@ -120,7 +120,7 @@ def test_a_chiral_rod_neither_winds_up_nor_turns_on_average():
     for _ in range(steps):
         walk(simulation, 1)
         turned += simulation.state_now.y_old[:, 3].reshape(rods, nodes)
-        twist += simulation.shape.twist.reshape(rods, nodes)[:, :-1].mean(axis=1) / steps
+        twist += simulation.configuration.twist.reshape(rods, nodes)[:, :-1].mean(axis=1) / steps
     for values, expected in (
         (turned.mean(axis=1), 0.0),
         (turned[:, -1] - turned[:, 0], 0.0),
@@ -168,12 +168,12 @@ def distances(nodes: int, rods: int, energy: float, stretching: float, dt: float
     if not drift:
         simulation.model.noise._drift[:] = 0
     r = chains(rods, nodes, energy, seed=1).reshape(-1, 3)
-    start = simulation.mechanics.start(r, np.tile([0.0, 0.0, 1.0], (len(r), 1)))
+    start = simulation.system.start(r, np.tile([0.0, 0.0, 1.0], (len(r), 1)))
     simulation.state_now = State(0.0, start, np.zeros_like(r), 0.0)
     out = np.zeros(rods)
     for _ in range(steps // 20):
         walk(simulation, 20)
-        r = simulation.shape.r.reshape(rods, nodes, 3)
+        r = simulation.configuration.r.reshape(rods, nodes, 3)
         out += np.sum((r[:, -1] - r[:, 0]) ** 2, axis=1) / (steps // 20)
     return out
 

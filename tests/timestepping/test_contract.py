@@ -14,8 +14,8 @@ from helpers.scenes import scene
 from ibfil.assembly import rods as assembly_rods
 from ibfil.assembly.fluids.models import fluid_model
 from ibfil.fluids.base import Fluid, Response
-from ibfil.linalg.constraints import Held
-from ibfil.rods.system import Mechanics
+from ibfil.linalg.constraints import Prescribed
+from ibfil.rods.system import RodSystem
 
 GRID = {"model": "stokes", "box": [1.6, 2.0, 1.8], "cells": [16, 20, 18], "slip": 0.01}
 FLOW = ["0.3 + y", "sin(x + t)", "0"]
@@ -89,12 +89,12 @@ class Asked(NamedTuple):
 
     fluid: Fluid
     response: Response
-    mechanics: Mechanics
+    system: RodSystem
     r: np.ndarray
     e3: np.ndarray
     force: np.ndarray  # (n, m)
     stiffness: np.ndarray
-    held: Held
+    held: Prescribed
     y: np.ndarray
     target: np.ndarray
 
@@ -105,19 +105,19 @@ def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2
         fluid = {key: value for key, value in fluid.items() if key != "rotation"}
     stacked = assembly_rods.rods(scene(rods, fluid))
     made = fluid_model(scene(rods, fluid)).build(stacked)
-    mechanics, rng = stacked.mechanics, np.random.default_rng(0)
-    n, m = len(stacked.s), mechanics.unknowns
-    held = mechanics.held(*BETWEEN)
-    start = mechanics.move(stacked.start, 1e-3 * rng.standard_normal((n, m)))
+    system, rng = stacked.system, np.random.default_rng(0)
+    n, m = len(stacked.s), system.unknowns
+    held = system.held(*BETWEEN)
+    start = system.move(stacked.start, 1e-3 * rng.standard_normal((n, m)))
     y = 1e-3 * rng.standard_normal((n, m))
-    shape = mechanics.move(start, y)
-    force, inner = mechanics.forces(shape, BETWEEN[1])
-    stiffness = mechanics.stiffness(shape, start, inner, BETWEEN[1])
+    shape = system.move(start, y)
+    force, inner = system.forces(shape, BETWEEN[1])
+    stiffness = system.stiffness(shape, start, inner, BETWEEN[1])
     target = 1e-3 * rng.standard_normal((n, m))
     for _ in range(steps):
         made.advance(made.response(shape.r, shape.e3, BETWEEN[0], 0.8 * TAU), force)
     response = made.response(shape.r, shape.e3, BETWEEN[1], TAU, 0.5)
-    return Asked(made, response, mechanics, shape.r, shape.e3, force, stiffness, held, y, target)
+    return Asked(made, response, system, shape.r, shape.e3, force, stiffness, held, y, target)
 
 
 def times(matrix: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -131,14 +131,14 @@ def times(matrix: np.ndarray, d: np.ndarray) -> np.ndarray:
     return out
 
 
-def elsewhere(values: np.ndarray, held: Held) -> np.ndarray:
+def elsewhere(values: np.ndarray, held: Prescribed) -> np.ndarray:
     """The values at unknowns that are not held."""
     return np.delete(values.ravel(), held.at)
 
 
 def moved(response: Response, force: np.ndarray, target: np.ndarray) -> np.ndarray:
     """target + tau (u0 + M force): what the fluid says when nothing is held."""
-    return response.forced(force, Held(np.zeros(0, np.int64), np.zeros(0)), target).move
+    return response.forced(force, Prescribed(np.zeros(0, np.int64), np.zeros(0)), target).move
 
 
 EACH_SCENE = pytest.mark.parametrize("name", SCENES)

@@ -22,9 +22,9 @@ PRESSED = {
 
 def matrices(simulation: Simulation, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Z, the stiffness of that name (27, 27) and f (27,) of the rod as it starts."""
-    mechanics, shape, drag = simulation.mechanics, simulation.shape, simulation.fluid.drag
-    force, moment = mechanics.forces(shape, 0.0)
-    k = banded.dense(getattr(mechanics, kind)(shape, shape, moment, 0.0)).reshape(27, 27)
+    system, shape, drag = simulation.system, simulation.configuration, simulation.fluid.drag
+    force, moment = system.forces(shape, 0.0)
+    k = banded.dense(getattr(system, kind)(shape, shape, moment, 0.0)).reshape(27, 27)
     z = np.zeros((9, 3, 9, 3))
     for i, t in enumerate(shape.e3):
         z[i, :, i] = drag.perp[i] * (np.eye(3) - np.outer(t, t)) + drag.par[i] * np.outer(t, t)

@@ -71,7 +71,7 @@ def _path(rod, end, time, outputs=4):
     for k in range(outputs):
         simulation.advance(end * (k + 1) / outputs, lambda: None)
         assert simulation.time == end * (k + 1) / outputs
-        out.append(simulation.shape.r.copy())
+        out.append(simulation.configuration.r.copy())
     return np.array(out), simulation
 
 
@@ -129,7 +129,7 @@ def test_outputs_are_hit_exactly_and_a_cut_run_goes_on_with_the_same_steps(time)
         whole.advance(goal, lambda: None)
         again.advance(goal, lambda: None)
         assert whole.time == again.time == goal
-        assert np.array_equal(whole.shape.r, again.shape.r)
+        assert np.array_equal(whole.configuration.r, again.configuration.r)
     assert whole.steps == again.steps
 
 
@@ -163,7 +163,7 @@ def _in_a_heavy_fluid(tolerance, end=0.6):
     found, lengths = [], []
     for k in range(1, round(end / 0.05) + 1):
         simulation.advance(0.05 * k, lambda: lengths.append(simulation.state_now.dt_old))
-        found.append(simulation.shape.r)
+        found.append(simulation.configuration.r)
     return np.array(found), np.array(lengths)
 
 
@@ -199,7 +199,7 @@ def test_automatic_steps_follow_a_rod_from_cell_to_cell_where_the_fluid_is_heavy
         text = rod + NAVIER_STOKES.format(tolerance=1).replace("tolerance = 1", f"step = {step}")
         simulation = Simulation(parse_case(text.replace("density = 10.0", "density = 100.0"), "test.toml"))
         simulation.advance(1.25, lambda: None)
-        return simulation.shape.r, simulation.steps
+        return simulation.configuration.r, simulation.steps
 
     (best, _), (given, few), (found, more) = ends(np.pi / 1000), ends(np.pi / 125), ends('"auto"')
     error, coarse = (float(np.sqrt(np.mean(np.sum((r - best) ** 2, axis=1)))) for r in (found, given))
@@ -232,7 +232,7 @@ def test_a_step_that_cannot_be_solved_is_halved_and_told_and_given_up_at_the_flo
     simulation = _simulation(rod, 0.2, "step = 0.2")
     simulation.advance(0.2, lambda: None)
     assert simulation.shortened > 0
-    assert simulation.frame().diagnostics["steps_shortened"] == simulation.shortened
+    assert simulation.snapshot().diagnostics["steps_shortened"] == simulation.shortened
     with pytest.raises(RunFailed, match=r"dt = 0\.2") as failure:
         _simulation(rod, 0.2, "step = 0.2\nmin_step = 0.15").advance(0.2, lambda: None)
     assert failure.value.advice

@@ -59,9 +59,9 @@ def test_what_is_left_of_the_error_is_below_the_tolerance(fluid, stretching: flo
         answer = solve(self, equation, *start)
         y = answer[0]
         for _ in range(2):
-            shape = equation.rods.move(equation.start, y)
-            y = y + equation.correction(y, shape, equation.rods.stiffness)[0].move
-        left.append(_size(y - answer[0], equation.rods.length))
+            shape = equation.system.move(equation.start, y)
+            y = y + equation.correction(y, shape, equation.system.stiffness)[0].move
+        left.append(_size(y - answer[0], equation.system.length))
         return answer
 
     monkeypatch.setattr(Implicit, "_quickly", watched)
@@ -76,12 +76,12 @@ def test_a_rod_that_hardly_stretches_takes_few_iterations(fluid) -> None:
     step, steps = 0.01, 20
     simulation = Simulation(swimmer(fluid, stretching=1.6e4, step=step, end=steps * step))
     simulation.advance(2 * step, lambda: None)
-    forces, counted = simulation.mechanics.forces, []
+    forces, counted = simulation.system.forces, []
 
     def counting(*arguments):
         counted.append(1)
         return forces(*arguments)
 
-    simulation.mechanics.forces = counting  # type: ignore[method-assign]
+    simulation.system.forces = counting  # type: ignore[method-assign]
     simulation.advance(steps * step, lambda: None)
     assert len(counted) <= 4 * (steps - 2)

@@ -20,7 +20,7 @@ from ibfil.case.schema import Case
 from ibfil.errors import RunFailed
 from ibfil.fluids import resistive_force
 from ibfil.linalg import banded
-from ibfil.rods.geometry import Geometry
+from ibfil.rods.geometry import Configuration
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping.base import NotConverged, State
 from ibfil.timestepping.implicit import Implicit
@@ -48,15 +48,15 @@ SCENES = pytest.mark.parametrize("build", [swimming, twisting], ids=["swimmer", 
 
 
 @cache
-def reference(build: Build, end: float = END) -> Geometry:
+def reference(build: Build, end: float = END) -> Configuration:
     """The path by BDF2, 16 times finer than the finest step compared with it: 256 times closer, 2 % at order 1."""
-    return run(build(end=end, step=end / 2560)).shape
+    return run(build(end=end, step=end / 2560)).configuration
 
 
 def errors(build: Build, counts: tuple[int, ...], end: float = END, **keys: Any) -> tuple[list, list]:
     """Errors at the end of positions and of e1, rms over nodes, in so many steps."""
     exact = reference(build, end)
-    shapes = [run(build(end=end, step=end / count, **keys)).shape for count in counts]
+    shapes = [run(build(end=end, step=end / count, **keys)).configuration for count in counts]
     return [rms(g.r - exact.r) for g in shapes], [rms(g.e1 - exact.e1) for g in shapes]
 
 
@@ -102,7 +102,7 @@ def test_the_explicit_scheme_is_first_order_and_finds_the_same_path(build: Build
 
 @SCENES
 def test_the_scene_moves_and_bends_and_twists_enough_to_tell(build: Build) -> None:
-    start, end = Simulation(build(end=END, step=END)).shape, reference(build)
+    start, end = Simulation(build(end=END, step=END)).configuration, reference(build)
     assert rms(end.r - start.r) > 0.05
     assert np.abs(end.bend[:, 0]).max() > 1.0
     if build is twisting:
@@ -120,13 +120,13 @@ def test_bdf2_is_second_order_at_steps_that_change_all_the_time(build: Build) ->
     shape = rods.start
     positions, directors = [], []
     for count in (40, 80, 160):
-        state = State(0.0, shape, np.zeros((len(shape.r), rods.mechanics.unknowns)), 0.0)
+        state = State(0.0, shape, np.zeros((len(shape.r), rods.system.unknowns)), 0.0)
         long = END / (0.75 * count)
         for k in range(count):
-            state = Implicit(2).step(rods.mechanics, fluid, state, long if k % 2 == 0 else 0.5 * long).state
+            state = Implicit(2).step(rods.system, fluid, state, long if k % 2 == 0 else 0.5 * long).state
         assert state.time == pytest.approx(END, rel=1e-12)
-        positions.append(rms(state.shape.r - exact.r))
-        directors.append(rms(state.shape.e1 - exact.e1))
+        positions.append(rms(state.configuration.r - exact.r))
+        directors.append(rms(state.configuration.e1 - exact.e1))
     assert_order(positions, 2)
     if build is twisting:
         assert_order(directors, 2)
@@ -142,15 +142,15 @@ def test_size_and_viscosity_and_stiffness_drop_out(build: Build, scheme: str) ->
         keys |= {"end": 0.02, "step": 5e-5}
     one = run(build(**keys))
     two = run(build(length=2.5, viscosity=0.3, bending=1.7, **keys))
-    assert two.shape.r / 2.5 == pytest.approx(one.shape.r, abs=1e-10)
-    assert two.shape.e1 == pytest.approx(one.shape.e1, abs=1e-10)
+    assert two.configuration.r / 2.5 == pytest.approx(one.configuration.r, abs=1e-10)
+    assert two.configuration.e1 == pytest.approx(one.configuration.e1, abs=1e-10)
     assert one.steps == two.steps
     unit = 0.3 * 2.5**4 / 1.7
-    assert two.frame().filaments["rod"].force * 2.5**2 / 1.7 == pytest.approx(
-        one.frame().filaments["rod"].force, abs=1e-6
+    assert two.snapshot().filaments["rod"].force * 2.5**2 / 1.7 == pytest.approx(
+        one.snapshot().filaments["rod"].force, abs=1e-6
     )
-    assert two.frame().filaments["rod"].velocity * unit / 2.5 == pytest.approx(
-        one.frame().filaments["rod"].velocity, abs=1e-7
+    assert two.snapshot().filaments["rod"].velocity * unit / 2.5 == pytest.approx(
+        one.snapshot().filaments["rod"].velocity, abs=1e-7
     )
 
 
@@ -163,7 +163,7 @@ def test_newtons_iteration_is_bounded_and_says_so() -> None:
     fluid = fluid_model(case).build(rods)
     state = State(0.0, rods.start, np.zeros((21, 3)), 0.0)
     with pytest.raises(NotConverged, match="1 iteration"):
-        Implicit(2, most=1).step(rods.mechanics, fluid, state, 0.3)
+        Implicit(2, most=1).step(rods.system, fluid, state, 0.3)
 
 
 def straight_spinning(**time: Any) -> Case:
@@ -177,16 +177,18 @@ def test_a_step_solves_its_own_equation_to_the_tolerance(build: Build) -> None:
     """Z (y - target)/tau = f(y) + R at each unknown, up to a change of 1e-8 in positions and turns."""
     case = build(end=END, step=END / 20)
     rods = assembly_rods.rods(case)
-    mechanics, n = rods.mechanics, len(rods.start.r)
+    system, n = rods.system, len(rods.start.r)
     fluid = fluid_model(case).build(rods)
     drag = assembly_drag.drag(case, rods)
-    state = State(0.0, rods.start, np.zeros((n, mechanics.unknowns)), 0.0)
+    state = State(0.0, rods.start, np.zeros((n, system.unknowns)), 0.0)
     for _ in range(15):
-        before, step = state, Implicit(1).step(mechanics, fluid, state, END / 20)
+        before, step = state, Implicit(1).step(system, fluid, state, END / 20)
         state = step.state
-        force, moment = mechanics.forces(state.shape, state.time)
-        residual = resistive_force.resist(drag, before.shape.e3, state.y_old) / (END / 20) - force - step.reaction
-        matrix = mechanics.stiffness(state.shape, before.shape, moment, state.time)
+        force, moment = system.forces(state.configuration, state.time)
+        residual = (
+            resistive_force.resist(drag, before.configuration.e3, state.y_old) / (END / 20) - force - step.reaction
+        )
+        matrix = system.stiffness(state.configuration, before.configuration, moment, state.time)
         largest = np.abs(matrix).sum(axis=2) + max(drag.perp.max(), drag.spin.max()) / (END / 20)
         assert np.all(np.abs(residual) <= 1e-8 * largest)
         assert step.iterations <= 4
@@ -228,8 +230,8 @@ def test_a_restored_state_goes_on_bit_for_bit(build: Build) -> None:
     second = Simulation(case)
     second.restore(kept)
     second.advance(END, lambda: None)
-    assert np.array_equal(second.shape.r, whole.shape.r)
-    assert np.array_equal(second.shape.e1, whole.shape.e1)
+    assert np.array_equal(second.configuration.r, whole.configuration.r)
+    assert np.array_equal(second.configuration.e1, whole.configuration.e1)
     assert second.steps == whole.steps
 
 
@@ -273,9 +275,9 @@ def test_the_automatic_step_of_several_filaments_is_that_of_the_fastest() -> Non
 
 def dense_limit(simulation: Simulation) -> float:
     """2 over the largest eigenvalue of Z^-1 K, by LAPACK, held unknowns struck out."""
-    mechanics, shape = simulation.mechanics, simulation.shape
-    _, moment = mechanics.forces(shape, simulation.time)
-    k = banded.dense(mechanics.stiffness(shape, shape, moment, simulation.time))
+    system, shape = simulation.system, simulation.configuration
+    _, moment = system.forces(shape, simulation.time)
+    k = banded.dense(system.stiffness(shape, shape, moment, simulation.time))
     n, m = k.shape[:2]
     drag = assembly_drag.drag(simulation.case, assembly_rods.rods(simulation.case))
     for i in range(n):
@@ -284,7 +286,7 @@ def dense_limit(simulation: Simulation) -> float:
         z[:3, :3] = drag.perp[i] * np.eye(3) + (drag.par[i] - drag.perp[i]) * np.outer(e3, e3)
         z[3:, 3:] *= drag.spin[i]
         k[i] = np.einsum("ab,bjc->ajc", np.linalg.inv(z), k[i])
-    free = np.setdiff1d(np.arange(n * m), mechanics.ends.index)
+    free = np.setdiff1d(np.arange(n * m), system.ends.index)
     matrix = k.reshape(n * m, n * m)[np.ix_(free, free)]
     return float(2.0 / np.abs(np.linalg.eigvals(matrix)).max())
 
@@ -329,10 +331,10 @@ def test_just_below_the_explicit_limit_is_stable_and_just_above_is_not(
     }
     limit = Simulation(scene({"rod": keys})).explicit_limit()
     simulation = Simulation(scene({"rod": keys}, end=100 * factor * limit, step=factor * limit, scheme="explicit"))
-    before = simulation.shape.r.copy()
+    before = simulation.configuration.r.copy()
     simulation.advance(simulation.case.time.end, lambda: None)
     assert simulation.steps == 100
-    moved = np.abs(simulation.shape.r - before).max()
+    moved = np.abs(simulation.configuration.r - before).max()
     assert moved < 1e-8 if stable else moved > 1e-6
 
 

@@ -23,7 +23,7 @@ from ibfil.simulation.simulation import Simulation
 def test_kicks_have_the_covariance_of_the_drag_and_nodes_know_nothing_of_each_other(directions):
     energy, dt, count = 0.3, 1e-3, 20000
     simulation = Simulation(scene({"rod": BENT}, energy, directions=directions))
-    noise, shape = simulation.model.noise, simulation.shape
+    noise, shape = simulation.model.noise, simulation.configuration
     draws = np.array([noise.force(shape, dt) for _ in range(count)]) * dt
     mean = np.asarray(noise.force(shape, 1e300)) * dt  # what does not vanish as the step grows: the drift
     n = len(mean)
@@ -60,20 +60,20 @@ def test_the_drift_is_kt_times_the_divergence_of_the_mobility(rod, directions):
     """Each node's mobility is differenced along each direction it is kicked in; others do not enter it."""
     energy, h = 0.3, 1e-5
     simulation = Simulation(scene({"rod": rod}, energy, directions=directions))
-    noise, shape = simulation.model.noise, simulation.shape
+    noise, shape = simulation.model.noise, simulation.configuration
     if directions == "xy":  # in the plane, as it is meant
         flat = shape.r * [1, 1, 0]
-        shape = simulation.mechanics.start(flat, np.tile([0.0, 0.0, 1.0], (len(flat), 1)))
+        shape = simulation.system.start(flat, np.tile([0.0, 0.0, 1.0], (len(flat), 1)))
     drag, dimensions = simulation.fluid.drag, len(directions)
 
     def mobility(r: np.ndarray, i: int, a: int) -> np.ndarray:
         """Column a of node i's mobility, at positions r."""
         unit = np.zeros((len(r), 4))
         unit[i, a] = 1.0
-        return resistive_force.mobilize(drag, measure(simulation.mechanics.mesh, r, shape.e1).e3, unit)[i, :3]
+        return resistive_force.mobilize(drag, measure(simulation.system.mesh, r, shape.e1).e3, unit)[i, :3]
 
     expected = np.zeros_like(shape.r)
-    free = np.setdiff1d(np.arange(4 * len(shape.r)), simulation.mechanics.ends.index)
+    free = np.setdiff1d(np.arange(4 * len(shape.r)), simulation.system.ends.index)
     for i in np.unique(free[free % 4 < 3] // 4):
         for a in range(dimensions):
             there, back = shape.r.copy(), shape.r.copy()
@@ -89,7 +89,7 @@ def test_the_drift_is_kt_times_the_divergence_of_the_mobility(rod, directions):
 def test_without_the_drift_the_ends_of_a_free_rod_would_be_pushed_inwards_by_one_and_a_half_kt_over_ds():
     energy = 0.3
     simulation = Simulation(scene({"rod": ROD}, energy))
-    drift = simulation.model.noise.force(simulation.shape, 1e300)
+    drift = simulation.model.noise.force(simulation.configuration, 1e300)
     expected = np.zeros((9, 3))
     expected[[0, -1], 0] = np.array([-1, 1]) * 1.5 * energy * 8
     np.testing.assert_allclose(drift, expected, atol=1e-12)
@@ -106,12 +106,12 @@ def test_a_step_is_the_linearised_trapezoid(force):
     dt = 1e-3
     simulation = Simulation(scene({"rod": rod}, 1e-3, fluid=flow, time={"step": dt}))
     twin = Simulation(simulation.case)
-    start, mechanics = simulation.shape, simulation.mechanics
+    start, system = simulation.configuration, simulation.system
     n, m = len(start.r), 4
     middle = 0.5 * dt
 
     def forces(y: np.ndarray) -> np.ndarray:
-        return mechanics.forces(mechanics.move(start, y.reshape(n, m)), middle)[0].ravel()
+        return system.forces(system.move(start, y.reshape(n, m)), middle)[0].ravel()
 
     h = 1e-6
     k = np.array([(forces(h * e) - forces(-h * e)) / (2 * h) for e in np.eye(n * m)]).T
@@ -119,7 +119,7 @@ def test_a_step_is_the_linearised_trapezoid(force):
     kicks = dt * twin.model.noise.force(start, dt).ravel()
     u0 = np.zeros((n, m))
     u0[:, :3] = np.stack([0.3 * start.r[:, 1], np.full(n, 0.2), np.full(n, 10 * middle)], axis=1)
-    held, prescribed = mechanics.ends.index, np.array([0, 0, 0, 3.0 * dt])
+    held, prescribed = system.ends.index, np.array([0, 0, 0, 3.0 * dt])
     left, right = z - 0.5 * dt * k, dt * (forces(np.zeros(n * m)) + z @ u0.ravel()) + kicks
     free = np.setdiff1d(np.arange(n * m), held)
     expected = np.zeros(n * m)
@@ -135,10 +135,10 @@ def test_a_step_is_the_linearised_trapezoid(force):
 def test_a_free_rod_gives_the_fluid_no_net_force_however_it_is_kicked():
     simulation = Simulation(scene({"rod": BENT}, 1e-2))
     walk(simulation, 20)
-    frame = simulation.frame()
-    size = np.sum(np.abs(frame.filaments["rod"].force))
+    snapshot = simulation.snapshot()
+    size = np.sum(np.abs(snapshot.filaments["rod"].force))
     assert size > 1
-    assert np.max(np.abs(frame.diagnostics["net_force"])) < 1e-9 * size
+    assert np.max(np.abs(snapshot.diagnostics["net_force"])) < 1e-9 * size
 
 
 @pytest.mark.parametrize("force", ["eq44", "torque-free"])
@@ -150,10 +150,10 @@ def test_the_stiffness_of_a_straight_rod_at_rest_is_symmetric(ends, spacing, for
     rod |= {"start": {"end": ends[0]}, "finish": {"end": ends[1]}}
     for derivative in (2, 6):
         simulation = Simulation(scene({"rod": {**rod, "derivative": derivative}}))
-        mechanics, shape = simulation.mechanics, simulation.shape
-        _, inner = mechanics.forces(shape, 0.0)
-        k = banded.dense(mechanics.stiffness(shape, shape, inner, 0.0)).reshape(44, 44)
-        free = np.setdiff1d(np.arange(44), mechanics.ends.index)
+        system, shape = simulation.system, simulation.configuration
+        _, inner = system.forces(shape, 0.0)
+        k = banded.dense(system.stiffness(shape, shape, inner, 0.0)).reshape(44, 44)
+        free = np.setdiff1d(np.arange(44), system.ends.index)
         k = k[np.ix_(free, free)]
         uneven = np.max(np.abs(k - k.T)) / np.max(np.abs(k))
         assert uneven < 1e-12 if derivative == 2 else uneven > 1e-3
@@ -161,7 +161,7 @@ def test_the_stiffness_of_a_straight_rod_at_rest_is_symmetric(ends, spacing, for
 
 def test_twist_is_left_out_where_it_is_asked():
     simulation = Simulation(scene({"rod": {**ROD, "twisting": 1.0}}, 1e-6, twist=False))
-    assert np.all(simulation.model.noise.force(simulation.shape, 1e-3)[:, 3] == 0)
+    assert np.all(simulation.model.noise.force(simulation.configuration, 1e-3)[:, 3] == 0)
 
 
 # --- runs ---------------------------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
     for seed in (1, 1, 2):
         simulation = Simulation(scene({"rod": BENT}, seed=seed))
         walk(simulation, 10)
-        ends.append((simulation.shape.r.tobytes(), simulation.shape.e1.tobytes()))
+        ends.append((simulation.configuration.r.tobytes(), simulation.configuration.e1.tobytes()))
     assert ends[0] == ends[1]
     assert ends[0][0] != ends[2][0]
 
@@ -206,18 +206,18 @@ def test_no_random_numbers_are_made_or_kept_without_a_thermal_table():
 
 def test_no_energy_no_kicks():
     simulation = Simulation(scene({"rod": ROD}, 0.0))
-    before = simulation.shape.r.copy()
+    before = simulation.configuration.r.copy()
     walk(simulation, 10)
-    assert np.array_equal(simulation.shape.r, before)
+    assert np.array_equal(simulation.configuration.r, before)
     assert "A/(kT L)" not in groups(simulation)
 
 
 def test_kicks_in_the_plane_leave_a_rod_in_it():
     rod = {**ROD, "curvature": [0, 3.0], "normal": [0, 1, 0], "shape": {"kind": "relaxed"}}
     simulation = Simulation(scene({"rod": rod}, 1e-2, directions="xy"))
-    start = simulation.shape.r.copy()
+    start = simulation.configuration.r.copy()
     walk(simulation, 100)
-    moved = simulation.shape.r - start
+    moved = simulation.configuration.r - start
     assert np.max(np.abs(moved[:, :2])) > 1e-2
     assert np.max(np.abs(moved[:, 2])) < 1e-12
 
@@ -226,9 +226,9 @@ def test_held_ends_stay_and_a_clamp_that_leaves_twist_free_turns():
     rod = {**ROD, "twisting": 1.0, "start": {"end": "clamped"}, "finish": {"end": "hinged"}}
     free = {**ROD, "twisting": 1.0, "start": {"end": "clamped", "twist": "free"}}
     simulation = Simulation(scene({"held": rod, "free": free}, 1e-3))
-    before = simulation.shape
+    before = simulation.configuration
     walk(simulation, 50)
-    after = simulation.shape
+    after = simulation.configuration
     for node in (0, 8, 9):
         np.testing.assert_allclose(after.r[node], before.r[node], atol=1e-15)
     for node in (0, 9):
@@ -240,7 +240,7 @@ def test_held_ends_stay_and_a_clamp_that_leaves_twist_free_turns():
 
 def test_a_rod_that_does_not_twist_beside_one_that_does_is_not_turned():
     simulation = Simulation(scene({"plain": ROD, "twisting": {**ROD, "twisting": 1.0}}))
-    kicks = simulation.model.noise.force(simulation.shape, 1e-3)
+    kicks = simulation.model.noise.force(simulation.configuration, 1e-3)
     assert np.all(kicks[:9, 3] == 0)
     assert np.all(kicks[9:, 3] != 0)
 
@@ -248,10 +248,12 @@ def test_a_rod_that_does_not_twist_beside_one_that_does_is_not_turned():
 def test_a_soft_round_rod_without_twist_may_turn_its_frame_at_will():
     """Its e1 is carried along as kicks turn the tangents, differently from node to node; that is no twist."""
     simulation = Simulation(scene({"rod": ROD}, 0.1))
-    twisted = measure(simulation.mechanics.mesh, simulation.shape.r, np.tile([[0, 0, 1.0], [0, 1.0, 0]], (5, 1))[:9])
-    simulation.state_now = simulation.state_now._replace(shape=twisted)
+    twisted = measure(
+        simulation.system.mesh, simulation.configuration.r, np.tile([[0, 0, 1.0], [0, 1.0, 0]], (5, 1))[:9]
+    )
+    simulation.state_now = simulation.state_now._replace(configuration=twisted)
     walk(simulation, 1)
-    assert np.max(np.abs(simulation.shape.twist)) > 0
+    assert np.max(np.abs(simulation.configuration.twist)) > 0
 
 
 def test_a_step_that_fails_is_not_tried_again_with_other_kicks():

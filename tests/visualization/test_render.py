@@ -71,10 +71,10 @@ def test_a_motion_in_space_is_looked_at_from_a_corner():
 @pytest.mark.parametrize("size", [(400, 100), (100, 400)])
 def test_all_positions_are_in_the_picture(size):
     r = np.random.default_rng(3).uniform(-1, 1, (4, 9, 3)) * [3, 1, 2]
-    frame = frame_for(viewpoint([r]), [r], 0.2, size)
-    away = r.reshape(-1, 3) - frame.look.centre
-    assert np.abs(away @ frame.look.up).max() + 0.2 < frame.half
-    assert np.abs(away @ frame.right).max() + 0.2 < frame.half * frame.aspect
+    snapshot = frame_for(viewpoint([r]), [r], 0.2, size)
+    away = r.reshape(-1, 3) - snapshot.look.centre
+    assert np.abs(away @ snapshot.look.up).max() + 0.2 < snapshot.half
+    assert np.abs(away @ snapshot.right).max() + 0.2 < snapshot.half * snapshot.aspect
 
 
 # --- what is written --------------------------------------------------------------------------------------------------
@@ -108,11 +108,11 @@ def test_a_picture_shows_two_tubes_where_they_are(run, tmp_path):
     with open_run(run) as opened:
         positions = [np.asarray(c["position"]) for c in opened.filaments.values()]
         top, foot = bands(240)
-        frame = frame_for(viewpoint(positions), positions, 0.28, (320, 240 - top - foot))
+        snapshot = frame_for(viewpoint(positions), positions, 0.28, (320, 240 - top - foot))
     # 3 along y is so many pixels right and up; the tubes' pixels have moved by that.
-    scale = (240 - top - foot) / (2 * frame.half)
+    scale = (240 - top - foot) / (2 * snapshot.half)
     moved = np.array([0.0, 3.0, 0.0])
-    expected = -scale * (moved @ frame.look.up), scale * (moved @ frame.right)
+    expected = -scale * (moved @ snapshot.look.up), scale * (moved @ snapshot.right)
     found = seen[1][0] - seen[0][0], seen[1][1] - seen[0][1]
     np.testing.assert_allclose(found, expected, atol=12)
 
@@ -147,10 +147,10 @@ def test_a_film_has_a_picture_for_each_output(run, tmp_path, ending):
     path = tmp_path / f"film.{ending}"
     render.render(run, path, Wish(size=SIZE, fps=5.0), log=str)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
-    frames = list(imageio.get_reader(path).iter_data())
-    assert len(frames) == 5
-    assert frames[0].shape[:2] == (240, 320)
-    assert np.abs(frames[0].astype(int) - frames[-1]).max() > 100
+    snapshots = list(imageio.get_reader(path).iter_data())
+    assert len(snapshots) == 5
+    assert snapshots[0].shape[:2] == (240, 320)
+    assert np.abs(snapshots[0].astype(int) - snapshots[-1]).max() > 100
 
 
 # --- what is refused --------------------------------------------------------------------------------------------------

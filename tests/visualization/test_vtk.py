@@ -105,9 +105,9 @@ def test_directors_are_orthonormal_on_a_helix():
     e2, e3 = meshes.directors(r, e1, s)
     tangent = np.column_stack([-np.sin(s), np.cos(s), 0.5 + 0 * s]) / np.sqrt(1.25)
     np.testing.assert_allclose(e3, tangent, atol=5e-3)  # second order: (ds^2)/3 at the ends
-    frame = np.stack([e1, e2, e3], axis=1)
-    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (60, 1, 1)), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.det(frame), 1.0)
+    snapshot = np.stack([e1, e2, e3], axis=1)
+    np.testing.assert_allclose(snapshot @ snapshot.transpose(0, 2, 1), np.tile(np.eye(3), (60, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(snapshot), 1.0)
 
 
 def test_a_run_that_went_on_extends_the_collection(tmp_path):

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ...fluids.output import FluidOutput
     from ...fluids.stokes import StokesSolve
     from ...grid.periodic_grid import Grid
-    from ...io.frames import Frame
-    from ...rods.geometry import Geometry
-    from ..stacked import Stacked
+    from ...io.snapshots import Snapshot
+    from ...rods.geometry import Configuration
+    from ..stacked import RodStack
 
 
 class Term(NamedTuple):
@@ -39,17 +39,17 @@ class Scene(Protocol):
     """What the warnings of a fluid ask of a simulation: where its rods begin, and what they do then."""
 
     @property
-    def rods(self) -> Stacked:
+    def rods(self) -> RodStack:
         """The rods of the scene."""
 
     @property
-    def shape(self) -> Geometry:
+    def configuration(self) -> Configuration:
         """Their present configuration."""
 
     def nodes(self, name: str) -> slice:
         """The range of nodes of a filament, or of its first copy."""
 
-    def frame(self) -> Frame:
+    def snapshot(self) -> Snapshot:
         """What an output would hold."""
 
 
@@ -62,12 +62,12 @@ class FluidModel(ABC):
     # -- the fluid itself
 
     @abstractmethod
-    def build(self, rods: Stacked) -> Fluid:
+    def build(self, rods: RodStack) -> Fluid:
         """The fluid that answers to these rods. Raises CaseError where it cannot be made."""
 
     @abstractmethod
-    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
-        """What is put out of it besides the motion of the rods."""
+    def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
+        """What is written of it besides the motion of the rods."""
 
     @cached_property
     def grid(self) -> Grid | None:
@@ -81,25 +81,25 @@ class FluidModel(ABC):
 
         return flow(self.case)
 
-    def method(self, rods: Stacked) -> str:
+    def method(self, rods: RodStack) -> str:
         """How velocities are found."""
         return self.case.fluid.model
 
-    def transforms(self, rods: Stacked) -> bool:
+    def transforms(self, rods: RodStack) -> bool:
         """Whether steps transform fields, by plans that are worth keeping."""
         return False
 
     # -- what a step costs
 
-    def seconds(self, rods: Stacked) -> dict[str, float]:
+    def seconds(self, rods: RodStack) -> dict[str, float]:
         """Estimated seconds of a step by each method that the fluid has, from counts."""
         return {self.case.fluid.model: costs.of_rods(self.case, len(rods.s))}
 
     @abstractmethod
-    def terms(self, rods: Stacked, memory: Mapping[str, float], step: float) -> list[Term]:
+    def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
         """The fluid's terms in a step of length ``step``, given the bytes of large arrays by name."""
 
-    def memory(self, rods: Stacked) -> dict[str, float]:
+    def memory(self, rods: RodStack) -> dict[str, float]:
         """Bytes of its large arrays, by what they are for."""
         return {}
 

@@ -94,7 +94,7 @@ def of_spin(case: Case, name: str) -> list[str]:
 def of_images(grid: Grid, scene: Scene, name: str) -> list[str]:
     """A filament that, as it begins, reaches from one face of the box to the other."""
     box = np.asarray(grid.box)
-    spans = np.ptp(scene.shape.r[scene.nodes(name)], axis=0)
+    spans = np.ptp(scene.configuration.r[scene.nodes(name)], axis=0)
     axis = int(np.argmax(spans / box))
     if spans[axis] <= box[axis]:
         return []
@@ -106,9 +106,9 @@ def of_images(grid: Grid, scene: Scene, name: str) -> list[str]:
 
 def back_pressure(grid: Grid, scene: Scene) -> np.ndarray | None:
     """The mean pressure gradient (3,) that a net force on a periodic box implies; None if there is none."""
-    frame = scene.frame()
-    net = np.asarray(frame.diagnostics["net_force"])
-    scale = sum(float(np.sum(np.abs(f.force))) for f in frame.filaments.values())
+    snapshot = scene.snapshot()
+    net = np.asarray(snapshot.diagnostics["net_force"])
+    scale = sum(float(np.sum(np.abs(f.force))) for f in snapshot.filaments.values())
     if np.max(np.abs(net)) <= 1e-9 * scale:
         return None
     return net / float(np.prod(grid.box))

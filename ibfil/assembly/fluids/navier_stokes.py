@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.output import FluidOutput
     from ...fluids.stokes import Solver, Tabulated
-    from ..stacked import Stacked
+    from ..stacked import RodStack
     from .base import Scene
 
 CELLS, INERTIAL = 0.125, 0.5  # see crossing
@@ -50,23 +50,23 @@ class NavierStokesModel(GridModel):
         assert self.case.fluid.density is not None
         return self.case.fluid.density
 
-    def fluid(self, rods: Stacked, immersed: Immersed, method: str) -> Fluid:
+    def fluid(self, rods: RodStack, immersed: Immersed, method: str) -> Fluid:
         """The fluid, its forces answered by ``method``; what transforms whole fields shares one room for it."""
         from ...fluids import stokes
         from ...fluids.background_flow import Background
-        from ...fluids.navier_stokes import NavierStokes, Room
+        from ...fluids.navier_stokes import NavierStokes, Workspace
         from ...fluids.torque_coupling import TorqueStokesSolve
 
         threads = self.case.compute.threads
-        room = Room(immersed.grid, immersed.coupling.vectors, threads, immersed.number)
-        shared = room.flow if immersed.number is np.float64 else None  # solvers by FFT are exact to round-off
+        workspace = Workspace(immersed.grid, immersed.coupling.grid_vectors, threads, immersed.number)
+        shared = workspace.flow if immersed.number is np.float64 else None  # solvers by FFT are exact to round-off
         factor_cost = self.factor_cost(rods)
 
         def operator(alpha: float) -> Tabulated:
             if method == "table":
                 return stokes.StokesByTable(immersed, alpha)
             solver: Solver
-            if immersed.coupling.vectors == 1:
+            if immersed.coupling.grid_vectors == 1:
                 solver = stokes.StokesSolve(immersed.grid, immersed.viscosity, threads, alpha=alpha, transform=shared)
             else:
                 solver = TorqueStokesSolve(immersed.grid, immersed.viscosity, threads, alpha, shared)
@@ -77,9 +77,9 @@ class NavierStokesModel(GridModel):
         background = None
         if immersed.flow is not None:
             background = Background(immersed.grid, immersed.flow, flow_parts(self.case), threads)
-        return NavierStokes(immersed, self.density, operator, room, background)
+        return NavierStokes(immersed, self.density, operator, workspace, background)
 
-    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
+    def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """Of the velocity that the fluid has."""
         from ...fluids.inertial_fields import InertialFields
         from ...fluids.navier_stokes import NavierStokes
@@ -88,20 +88,20 @@ class NavierStokesModel(GridModel):
         assert isinstance(fluid, NavierStokes)
         return GridOutput(self.immersed(rods), InertialFields(fluid, self.flow, self.case.compute.threads))
 
-    def transforms(self, rods: Stacked) -> bool:
+    def transforms(self, rods: RodStack) -> bool:
         """Always: advection does."""
         return True
 
     # -- what a step costs
 
-    def _flow_terms(self, rods: Stacked, seconds: float, used: Mapping[str, float]) -> list[Term]:
+    def _flow_terms(self, rods: RodStack, seconds: float, used: Mapping[str, float]) -> list[Term]:
         """What answers to the forces; history and advection apart."""
-        past = min(seconds, costs.of_inertia(self.grid.cells.tolist(), self.parts))
+        past = min(seconds, costs.of_inertia(self.grid.cells.tolist(), self.components))
         held = used[_HISTORY] + used[_TRANSFORMS]
         rest = super()._flow_terms(rods, seconds - past, {"rest": sum(used.values()) - held})
         return [*rest, Term("inertia and advection", past, held)]
 
-    def memory(self, rods: Stacked) -> dict[str, float]:
+    def memory(self, rods: RodStack) -> dict[str, float]:
         """History and transforms, and the background flow; two mobility tables: of Euler's first step, and BDF2's."""
         out, cells = super().memory(rods), self.grid.cells
         modes = 3 * 2 * self._number * float(np.prod(cells[:2])) * (cells[2] // 2 + 1)

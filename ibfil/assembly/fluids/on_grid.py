@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...fluids.stokes import Solver
     from ...grid.kernels import Kernel
     from ...grid.periodic_grid import Grid
-    from ..stacked import Stacked
+    from ..stacked import RodStack
     from .base import Scene
 
 FIELDS = "fields and their transforms"
@@ -44,34 +44,34 @@ class GridModel(FluidModel):
         return grids.kernel(self.case)
 
     @property
-    def parts(self) -> int:
+    def components(self) -> int:
         """How many numbers of a node go through the grid: 3, or 4 with its twist torque."""
         return 4 if self.case.couples_torque else 3
 
     # -- the fluid itself
 
     @abstractmethod
-    def fluid(self, rods: Stacked, immersed: Immersed, method: str) -> Fluid:
+    def fluid(self, rods: RodStack, immersed: Immersed, method: str) -> Fluid:
         """The fluid by one of its methods."""
 
-    def build(self, rods: Stacked) -> Fluid:
+    def build(self, rods: RodStack) -> Fluid:
         """The fluid by the method of the case, or the one that counts say is cheapest."""
         return self.fluid(rods, self.immersed(rods), self.method(rods))
 
-    def immersed(self, rods: Stacked) -> Immersed:
+    def immersed(self, rods: RodStack) -> Immersed:
         """What every fluid on this grid is made of."""
         from ...fluids import immersed_boundary
 
         case, grid, eta = self.case, self.grid, self.case.fluid.viscosity
-        volume = rods.mechanics.mesh.volume
+        volume = rods.system.mesh.volume
         slip = immersed_boundary.slip_mobility(case.fluid.slip, self.kernel, grid, eta, volume)
-        local = rods.mechanics.unknowns == 4 and not case.couples_torque
+        local = rods.system.unknowns == 4 and not case.couples_torque
         spin = drag(case, rods).spin if local else None
         number = np.float32 if case.fluid.single else np.float64
         coupling = grids.coupling(case, rods)
         return immersed_boundary.Immersed(grid, self.kernel, eta, slip, spin, self.flow, rods.nodes, number, coupling)
 
-    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
+    def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """Heat and fields, by an evaluation on the whole grid."""
         from ...fluids.fields import GridFields
         from ...fluids.output import GridOutput
@@ -79,18 +79,18 @@ class GridModel(FluidModel):
         fields = GridFields(self.grid, self.case.fluid.viscosity, self.flow, self.case.compute.threads)
         return GridOutput(self.immersed(rods), fields)
 
-    def method(self, rods: Stacked) -> str:
+    def method(self, rods: RodStack) -> str:
         """The case's, or the cheapest by counts."""
         if self.case.fluid.method != "auto":
             return self.case.fluid.method
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
 
-    def transforms(self, rods: Stacked) -> bool:
+    def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""
         return self.method(rods) != "table"
 
-    def solver(self, rods: Stacked, method: str) -> Solver:
+    def solver(self, rods: RodStack, method: str) -> Solver:
         """What evaluates velocities by FFT: of the whole grid, or where that is cheaper of the filaments' box."""
         eta, threads = self.case.fluid.viscosity, self.case.compute.threads
         if self.case.couples_torque:
@@ -107,30 +107,30 @@ class GridModel(FluidModel):
 
     # -- what a step costs
 
-    def _sizes(self, rods: Stacked) -> list[int]:
+    def _sizes(self, rods: RodStack) -> list[int]:
         """Extents, in cells, of the box that holds the filaments' stencils at the start."""
         from ...grid.pruned_fft import bounding_box
 
         base, _ = self.kernel.stencil(self.grid.coordinates(rods.start.r))
         return bounding_box(base, self.kernel.points, self.grid.cells)[1]
 
-    def seconds(self, rods: Stacked) -> dict[str, float]:
+    def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         counts = [where.stop - where.start for where in rods.nodes]
-        return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.parts)
+        return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
 
-    def factor_cost(self, rods: Stacked) -> float:
+    def factor_cost(self, rods: RodStack) -> float:
         """What factoring the rods' own systems costs, in velocity evaluations."""
         evaluation = costs.evaluation(self.grid.cells.tolist(), self._sizes(rods), len(rods.s))
-        return sum(costs.factored(where.stop - where.start, self.parts) for where in rods.nodes) / evaluation
+        return sum(costs.factored(where.stop - where.start, self.components) for where in rods.nodes) / evaluation
 
-    def fills_little(self, rods: Stacked) -> bool:
+    def fills_little(self, rods: RodStack) -> bool:
         """Whether transforms of the filaments' bounding box alone are the cheaper ones."""
         cells = self.grid.cells.tolist()
         return costs.pruned_evaluation(cells, self._sizes(rods)) < costs.full_evaluation(cells)
 
-    def terms(self, rods: Stacked, memory: Mapping[str, float], step: float) -> list[Term]:
-        """The flow between nodes, and what is put out of it."""
+    def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
+        """The flow between nodes, and what is written of it."""
         used = {name: size for name, size in memory.items() if name not in (BAND, FIELDS)}
         seconds = self.seconds(rods)[self.method(rods)] - costs.of_rods(self.case, len(rods.s))
         flow = self._flow_terms(rods, seconds, used)
@@ -139,7 +139,7 @@ class GridModel(FluidModel):
             flow[0] = flow[0]._replace(bytes=flow[0].bytes + fields)
         return [*flow, *self._put_out(fields, step)]
 
-    def _flow_terms(self, rods: Stacked, seconds: float, used: Mapping[str, float]) -> list[Term]:
+    def _flow_terms(self, rods: RodStack, seconds: float, used: Mapping[str, float]) -> list[Term]:
         torques = ", torques too" if self.case.couples_torque else ""
         return [Term(f"flow between nodes{torques} ({self.method(rods)})", seconds, sum(used.values()))]
 
@@ -148,11 +148,11 @@ class GridModel(FluidModel):
         case, out, look = self.case, [], costs.full_evaluation(self.grid.cells.tolist())
         if case.output.grid_every is not None:
             seconds = len(case.output.fields) * look * step / case.output.grid_every
-            out.append(Term("fields put out", seconds, fields))
+            out.append(Term("fields written", seconds, fields))
         if case.dissipation_observed:
             every = case.output.every or case.time.end / max(len(case.output.times or ()), 1)
-            room = 0.0 if fields else 6 * 8.0 * float(np.prod(self.grid.cells))
-            out.append(Term("dissipation looked at", 1.5 * look * step / every, room))
+            workspace = 0.0 if fields else 6 * 8.0 * float(np.prod(self.grid.cells))
+            out.append(Term("dissipation looked at", 1.5 * look * step / every, workspace))
         return out
 
     @property
@@ -160,17 +160,19 @@ class GridModel(FluidModel):
         """Bytes of a number of tables and of fields with inertia."""
         return 4.0 if self.case.fluid.single else 8.0
 
-    def memory(self, rods: Stacked) -> dict[str, float]:
+    def memory(self, rods: RodStack) -> dict[str, float]:
         """The mobility table, what solves with it, and fields."""
-        n, m, method = len(rods.s), rods.mechanics.unknowns, self.method(rods)
-        rim, components = self.kernel.points - 1, 15 if self.parts == 4 else 6
-        out = {"mobility table": self._number * components * float(np.prod(self.grid.cells // 2 + 1 + 2 * rim))}
+        n, m, method = len(rods.s), rods.system.unknowns, self.method(rods)
+        rim, entries = self.kernel.points - 1, 15 if self.components == 4 else 6
+        out = {"mobility table": self._number * entries * float(np.prod(self.grid.cells // 2 + 1 + 2 * rim))}
         if method == "krylov":
-            band = 8.0 * n * m * m * (2 * rods.mechanics.profile.width + 1)
-            out["preconditioner"] = sum(8.0 * (self.parts * (w.stop - w.start)) ** 2 for w in rods.nodes) + 2 * band
-            out["Krylov vectors"] = 60 * 8.0 * self.parts * n
+            band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
+            out["preconditioner"] = (
+                sum(8.0 * (self.components * (w.stop - w.start)) ** 2 for w in rods.nodes) + 2 * band
+            )
+            out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
-            out["dense matrices"] = costs.dense_bytes(n, self.parts)
+            out["dense matrices"] = costs.dense_bytes(n, self.components)
         return out
 
     # -- what is told

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ...case.filament import Filament
     from ...fluids.base import Fluid
     from ...fluids.output import FluidOutput
-    from ..stacked import Stacked
+    from ..stacked import RodStack
     from .base import Scene
 
 _DRAG = 0.05  # seconds of drag, of those of the rods
@@ -25,19 +25,19 @@ DRAG_SCATTER = 0.02  # scatter of a straight rod's drag over places and directio
 class ResistiveForceModel(FluidModel):
     """Drag of each node, and no flow between nodes (Eq. 16, 17, 48)."""
 
-    def build(self, rods: Stacked) -> Fluid:
+    def build(self, rods: RodStack) -> Fluid:
         """Drag per node, in the background flow."""
         from ...fluids.resistive_force import ResistiveForce
 
-        return ResistiveForce(drag(self.case, rods), rods.mechanics.profile, self.flow)
+        return ResistiveForce(drag(self.case, rods), rods.system.profile, self.flow)
 
-    def output(self, rods: Stacked, fluid: Fluid) -> FluidOutput:
+    def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """The heat of drag."""
         from ...fluids.output import DragOutput
 
         return DragOutput(self.flow)
 
-    def terms(self, rods: Stacked, memory: Mapping[str, float], step: float) -> list[Term]:
+    def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
         """Drag alone."""
         n = len(rods.s)
         return [Term("drag of each node", _DRAG * costs.of_rods(self.case, n), 8.0 * 3 * n)]

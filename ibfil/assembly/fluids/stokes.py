@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.stokes import StokesSolve
-    from ..stacked import Stacked
+    from ..stacked import RodStack
 
 
 class StokesModel(GridModel):
     """Stokes flow on a periodic grid: all nodes and their images move each other at once."""
 
-    def fluid(self, rods: Stacked, immersed: Immersed, method: str) -> Fluid:
+    def fluid(self, rods: RodStack, immersed: Immersed, method: str) -> Fluid:
         """The exact table, or transforms, with the preconditioner that the method has."""
         from ...fluids import stokes
 
@@ -29,11 +29,11 @@ class StokesModel(GridModel):
             return stokes.StokesByKrylov(immersed, solver, self.factor_cost(rods))
         return stokes.StokesByFFT(immersed, solver)
 
-    def memory(self, rods: Stacked) -> dict[str, float]:
+    def memory(self, rods: RodStack) -> dict[str, float]:
         """Fields too, where steps or outputs transform them."""
         out = super().memory(rods)
         if self.transforms(rods) or self.case.output.grid_every is not None:
-            out[FIELDS] = (self.parts - 2) * 2 * 3 * 8.0 * float(np.prod(self.grid.cells))
+            out[FIELDS] = (self.components - 2) * 2 * 3 * 8.0 * float(np.prod(self.grid.cells))
         return out
 
     def modelled(self) -> list[str]:

@@ -19,7 +19,7 @@ VARY = "what is varied: KEY=V1,V2,..., any number of times; keys that change tog
 
 def add_study(command: argparse.ArgumentParser, kind: str) -> None:
     """Add the case, the folder and the jobs of a study."""
-    command.epilog = "Done runs are kept, cut ones gone on with: the same command again finishes a study."
+    command.epilog = "Done runs are kept, cut ones resumed: the same command again finishes a study."
     command.add_argument("words", nargs="+", metavar="CASE [KEY=VALUE ...]", help=CASE)
     command.add_argument("-o", dest="folder", metavar="DIR", help=f"the folder (default: the case's name -{kind})")
     command.add_argument("--jobs", type=count, default=1, metavar="N", help="runs side by side, one thread each")

@@ -29,7 +29,7 @@ def do(arguments: argparse.Namespace) -> int:
     case, changes, folder = begin(arguments, "compare")
     from ...studies.compare import study
 
-    made = study.compare(
+    result = study.compare(
         case,
         arguments.fluids.split(","),
         folder,
@@ -37,14 +37,14 @@ def do(arguments: argparse.Namespace) -> int:
         period=arguments.period,
         transient=arguments.transient,
         jobs=arguments.jobs,
-        say=log,
+        log=log,
     )
-    _print_comparison(made)
+    _print_comparison(result)
     print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
-    return 0 if all(column.outcome.done for column in made.columns) else 1
+    return 0 if all(column.outcome.done for column in result.columns) else 1
 
 
-def _print_comparison(made: Any) -> None:
+def _print_comparison(result: Any) -> None:
     """The table for the eye, and what each fluid models that not all do."""
     from ...analysis.summary import table
 
@@ -53,18 +53,18 @@ def _print_comparison(made: Any) -> None:
             return "-"
         return f"{found.value:.4g}" + ("" if found.error is None else f" +- {found.error:.1g}")
 
-    names = list(dict.fromkeys(key for column in made.columns for key in column.numbers))
-    lines = [["", *(column.fluid for column in made.columns)]]
-    lines += [[name, *(cell(column.numbers.get(name)) for column in made.columns)] for name in names]
+    names = list(dict.fromkeys(key for column in result.columns for key in column.numbers))
+    lines = [["", *(column.fluid for column in result.columns)]]
+    lines += [[name, *(cell(column.numbers.get(name)) for column in result.columns)] for name in names]
     print("\n".join(table(lines)))
-    window = made.window
+    window = result.window
     print(
         f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}; "
         "+- their standard error, from the scatter between these, not that of steps, nodes or cells"
     )
-    for column in made.columns:
+    for column in result.columns:
         for line in column.own or (column.outcome.message or "nothing that the others do not model",):
             print(f"  {column.fluid}: {line}")
-    for column in made.columns:
+    for column in result.columns:
         for line in column.shares:
             print(f"  {column.fluid}: {line}")

@@ -22,12 +22,12 @@ def do(arguments: argparse.Namespace) -> int:
     varied = axes(arguments.vary)
     from ...studies.stability import study
 
-    made = study.stability(case, varied, folder, changes, jobs=arguments.jobs, say=log)
-    print_table(study.rows(made), ("message",))
+    result = study.stability(case, varied, folder, changes, jobs=arguments.jobs, log=log)
+    print_table(study.rows(result), ("message",))
     print(
         "against a finer run, the largest over outputs: place and shape (without rigid motion), rms of nodes/L; "
         "turn, rad; stretch; force, ratio"
     )
-    print(f"{made.foretold} of {len(made.cells)} as predicted")
+    print(f"{result.foretold} of {len(result.cells)} as predicted")
     print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     return 0

@@ -31,7 +31,7 @@ def do(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.index is not None:
         return _one(sweep.run_one(case, varied, folder, arguments.index, changes))
-    rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, say=log)
+    rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, log=log)
     print_table([row.row() for row in rows], ("run", "message"))
     print(folder / sweep.TABLE)
     return 0 if all(row.outcome.done for row in rows) else 1

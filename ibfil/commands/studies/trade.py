@@ -39,7 +39,7 @@ def do(arguments: argparse.Namespace) -> int:
     varied = axes(arguments.vary)
     from ...studies.trade import study
 
-    made = study.trade(
+    result = study.trade(
         case,
         varied,
         folder,
@@ -49,29 +49,31 @@ def do(arguments: argparse.Namespace) -> int:
         clock=arguments.clock,
         budget=arguments.budget,
         jobs=arguments.jobs,
-        say=log,
+        log=log,
     )
-    print_table(study.rows(made), ("message",))
+    print_table(study.rows(result), ("message",))
     print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     if arguments.wanted is None:
         return 0
-    best = made.cheapest(arguments.wanted)
+    best = result.cheapest(arguments.wanted)
     if best is None:
-        return _none_within(made, arguments.wanted)
+        return _none_within(result, arguments.wanted)
     print(f"the cheapest within {arguments.wanted:g}:")
     print(*best.setting.overrides)
     return 0
 
 
-def _none_within(made: Trade, wanted: float) -> int:
+def _none_within(result: Trade, wanted: float) -> int:
     """Say how near the settings came."""
-    told = f"ibfil: no setting comes within {wanted:g} in {', '.join(made.measures)}"
-    done = [one for one in made.tried if one.errors]
+    message = f"ibfil: no setting comes within {wanted:g} in {', '.join(result.measures)}"
+    done = [one for one in result.trials if one.errors]
     if done:
-        best = min(done, key=lambda one: max(made.error(one, measure) for measure in made.measures))
-        worst = max(made.measures, key=lambda measure: made.error(best, measure))
+        best = min(done, key=lambda one: max(result.error(one, measure) for measure in result.measures))
+        worst = max(result.measures, key=lambda measure: result.error(best, measure))
         named = " ".join(best.setting.overrides)
-        told += f"; the nearest, {named}, is {made.error(best, worst):.2g} off in {worst}, with the reference's own"
-    print(told, file=sys.stderr)
+        message += (
+            f"; the nearest, {named}, is {result.error(best, worst):.2g} off in {worst}, with the reference's own"
+        )
+    print(message, file=sys.stderr)
     print("ibfil: what to change: vary other keys, or shorter steps", file=sys.stderr)
     return 1

@@ -27,7 +27,7 @@ _CERTAIN = 0.3
 _NOISE = 1e-9  # of the largest number: what is left of a rod that rests
 
 
-def draw(made: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
+def draw(result: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
     """Draw the comparison into ``path``."""
     import matplotlib
     from matplotlib.figure import Figure
@@ -40,11 +40,11 @@ def draw(made: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
         plane = plane_of_motion(positions)
         _shapes(panels[0, 0], runs, looks, plane)
         _paths(panels[0, 1], runs, looks)
-        _powers(panels[1, 0], made, runs, looks)
-        _numbers(panels[1, 1], made, looks)
+        _powers(panels[1, 0], result, runs, looks)
+        _numbers(panels[1, 1], result, looks)
         handles, labels = panels[0, 1].get_legend_handles_labels()
         fig.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8.5)
-        fig.suptitle(textwrap.fill(made.title, 100), x=0.012, ha="left", fontsize=10.5, fontweight="bold")
+        fig.suptitle(textwrap.fill(result.title, 100), x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         for axes, letter in zip(panels.flat, "abcd", strict=True):
             axes.set_title(f"({letter})", loc="left", fontsize=9)
         save(fig, path)
@@ -92,9 +92,9 @@ def _paths(axes: Axes, runs: Mapping[str, RunFile], looks: Looks) -> None:
     axes.set_ylabel(with_units(f"{AXES[axis]} of the {where}, from the start", units.length))
 
 
-def _powers(axes: Axes, made: Comparison, runs: Mapping[str, RunFile], looks: Looks) -> None:
+def _powers(axes: Axes, result: Comparison, runs: Mapping[str, RunFile], looks: Looks) -> None:
     """Power of the nodes over the periods that count, and dots for what the fluid dissipates."""
-    start = made.window.start if made.window else 0.0
+    start = result.window.start if result.window else 0.0
     for fluid, run in runs.items():
         colour, line = looks[fluid]
         inside = run.time >= start - 1e-9 * run.time[-1]
@@ -112,9 +112,9 @@ def _powers(axes: Axes, made: Comparison, runs: Mapping[str, RunFile], looks: Lo
     axes.set_ylabel(with_units("power", unit) + "\n(lines: F.u of the nodes; dots: dissipated)")
 
 
-def _numbers(axes: Axes, made: Comparison, looks: Looks) -> None:
+def _numbers(axes: Axes, result: Comparison, looks: Looks) -> None:
     """Each number over that of the first fluid, with the scatter between periods."""
-    columns = [column for column in made.columns if column.numbers]
+    columns = [column for column in result.columns if column.numbers]
     first = columns[0].numbers
     names = [key for key in first if key.startswith("observed: ") or any(word in key for word in _DRAWN)]
     names = [
@@ -143,5 +143,5 @@ def _numbers(axes: Axes, made: Comparison, looks: Looks) -> None:
     axes.axvline(1.0, color="0.8", lw=0.8, zorder=0)
     axes.set_yticks(range(len(names)), [textwrap.fill(name, 20) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
-    count = made.window.count if made.window else 0
+    count = result.window.count if result.window else 0
     axes.set_xlabel(f"over that of {columns[0].fluid}\n(mean of {count} periods; bars: standard error)")

@@ -35,7 +35,7 @@ BLOCKS = 4  # parts of the second half of a run that nothing drives in time
 _SLACK = 1e-3  # of a period: what it may be wrong by, found by sampling what drives
 _TRANSIENT = 1 / 3  # of a run, at least, and a whole period
 
-Say = Callable[[str], object]
+Log = Callable[[str], object]
 
 
 def _members(case: str, overrides: Sequence[str], fluids: Sequence[str]) -> list[Member]:
@@ -65,7 +65,7 @@ def compare(
     transient: float | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
-    say: Say = print,
+    log: Log = print,
 ) -> Comparison:
     """Run the scene under each fluid and write compare.csv, compare.json and compare.png into ``folder``.
 
@@ -74,7 +74,7 @@ def compare(
     Raises CaseError, RunFailed where no run came to an end, Interrupted.
     """
     folder, members = Path(folder), _members(case, overrides, fluids)
-    outcomes = run_members(members, folder, jobs=jobs, executor=executor, say=say)
+    outcomes = run_members(members, folder, jobs=jobs, executor=executor, log=log)
     if not any(outcome.done for outcome in outcomes):
         raise RunFailed("no fluid's run came to an end: " + "; ".join(outcome.message for outcome in outcomes))
     with ExitStack() as stack:
@@ -85,9 +85,9 @@ def compare(
         first = next(iter(runs))
         columns = tuple(_column(one, runs, first, window, own) for one in outcomes)
         title = next(iter(runs.values())).case.title
-        made = Comparison(title, window, columns, measured())
-        _write(made, folder, runs)
-    return made
+        result = Comparison(title, window, columns, measured())
+        _write(result, folder, runs)
+    return result
 
 
 def _column(
@@ -139,8 +139,8 @@ def driven_period(case: Case) -> float | None:
     """The slowest period of what drives the scene; None where nothing changes in time."""
     from ...simulation.simulation import Simulation
 
-    cycles = Simulation(case).cycles
-    return 2 * np.pi / min(cycles) if cycles else None
+    forcing_rates = Simulation(case).forcing_rates
+    return 2 * np.pi / min(forcing_rates) if forcing_rates else None
 
 
 def only_here(cases: Mapping[str, Case]) -> dict[str, tuple[str, ...]]:
@@ -152,14 +152,14 @@ def only_here(cases: Mapping[str, Case]) -> dict[str, tuple[str, ...]]:
     return {name: tuple(line for line in found if line not in everywhere) for name, found in lines.items()}
 
 
-def rows(made: Comparison) -> list[dict[str, Any]]:
+def rows(result: Comparison) -> list[dict[str, Any]]:
     """Return the table: a row a quantity, and for each fluid its value and error."""
-    names = list(dict.fromkeys(key for column in made.columns for key in column.numbers))
+    names = list(dict.fromkeys(key for column in result.columns for key in column.numbers))
     out = []
     for name in names:
-        unit = next(column.numbers[name].unit for column in made.columns if name in column.numbers)
+        unit = next(column.numbers[name].unit for column in result.columns if name in column.numbers)
         row: dict[str, Any] = {"quantity": name, "unit": unit}
-        for column in made.columns:
+        for column in result.columns:
             found = column.numbers.get(name)
             row |= {
                 column.fluid: None if found is None else found.value,
@@ -169,12 +169,12 @@ def rows(made: Comparison) -> list[dict[str, Any]]:
     return out
 
 
-def details(made: Comparison) -> dict[str, Any]:
+def details(result: Comparison) -> dict[str, Any]:
     """Return everything, ready for JSON."""
     return {
-        "title": made.title,
-        **made.about,
-        "window": None if made.window is None else asdict(made.window),
+        "title": result.title,
+        **result.about,
+        "window": None if result.window is None else asdict(result.window),
         "fluids": [
             {
                 "fluid": column.fluid,
@@ -186,14 +186,14 @@ def details(made: Comparison) -> dict[str, Any]:
                 "shares": column.shares,
                 "numbers": {name: asdict(found) for name, found in column.numbers.items()},
             }
-            for column in made.columns
+            for column in result.columns
         ],
     }
 
 
-def _write(made: Comparison, folder: Path, runs: Mapping[str, RunFile]) -> None:
+def _write(result: Comparison, folder: Path, runs: Mapping[str, RunFile]) -> None:
     from .figure import draw
 
-    write_csv(folder / TABLE, rows(made))
-    write_json(folder / DETAILS, details(made))
-    draw(made, runs, folder / FIGURE)
+    write_csv(folder / TABLE, rows(result))
+    write_json(folder / DETAILS, details(result))
+    draw(result, runs, folder / FIGURE)

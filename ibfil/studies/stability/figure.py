@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..settings import Axis
-    from .results import Cell, Map
+    from .results import Map, MapCell
 
 
 # Colours that all eyes tell apart (Okabe and Ito, lightened), and a letter in each square for prints without them.
@@ -26,12 +26,12 @@ _WORDS = {"W": "wrong: > 0.05 L away", "T": "turned: > 0.1 rad", "L": "locked: >
           "S": "stretched: > 0.02", "D": "diverged: failed", "?": "no reference", "": "stable"}  # fmt: skip
 
 
-def draw(made: Map, path: Path) -> None:
+def draw(result: Map, path: Path) -> None:
     """Draw the map into ``path``; what varies beyond two axes has a panel each."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    axes = [axis for axis in made.axes if len(axis.values) > 1] or list(made.axes[:1])
+    axes = [axis for axis in result.axes if len(axis.values) > 1] or list(result.axes[:1])
     across, down = axes[-1], axes[-2] if len(axes) > 1 else None
     others = [axis for axis in axes if axis is not across and axis is not down]
     panels = list(product(*(axis.values for axis in others)))
@@ -40,19 +40,19 @@ def draw(made: Map, path: Path) -> None:
         size = ((1.9 + 0.78 * columns) * len(panels) + 1.6, max(2.6, 1.7 + 0.52 * lines))
         fig = Figure(figsize=size, layout="constrained")
         grid = fig.subplots(1, len(panels), squeeze=False)[0]
-        for place, values in zip(grid, panels, strict=True):
+        for location, values in zip(grid, panels, strict=True):
             chosen = {
                 key: text
                 for axis, v in zip(others, values, strict=True)
                 for key, text in zip(axis.keys, v, strict=True)
             }
-            cells = [cell for cell in made.cells if all(cell.setting.values[k] == v for k, v in chosen.items())]
-            _panel(place, cells, across, down)
+            cells = [cell for cell in result.cells if all(cell.setting.values[k] == v for k, v in chosen.items())]
+            _panel(location, cells, across, down)
             if chosen:
-                place.set_title(", ".join(f"{key.rsplit('.', 1)[-1]} {text}" for key, text in chosen.items()))
-        _legend(fig, made)
+                location.set_title(", ".join(f"{key.rsplit('.', 1)[-1]} {text}" for key, text in chosen.items()))
+        _legend(fig, result)
         wide = int(9.5 * size[0])
-        fig.suptitle(textwrap.fill(made.title, wide), x=0.012, ha="left", fontsize=10, fontweight="bold")
+        fig.suptitle(textwrap.fill(result.title, wide), x=0.012, ha="left", fontsize=10, fontweight="bold")
         save(fig, path)
 
 
@@ -69,10 +69,10 @@ def _label(values: tuple[str, ...]) -> str:
     return "\n".join(short(text) for text in values)
 
 
-def _panel(axes: Axes, cells: list[Cell], across: Axis, down: Axis | None) -> None:
+def _panel(axes: Axes, cells: list[MapCell], across: Axis, down: Axis | None) -> None:
     """One map of two axes."""
 
-    def place(cell: Cell) -> tuple[int, int]:
+    def location(cell: MapCell) -> tuple[int, int]:
         def at(axis: Axis) -> int:
             return axis.values.index(tuple(cell.setting.values[key] for key in axis.keys))
 
@@ -81,7 +81,7 @@ def _panel(axes: Axes, cells: list[Cell], across: Axis, down: Axis | None) -> No
     shape = (1 if down is None else len(down.values), len(across.values))
     feared = np.zeros(shape, bool)
     for cell in cells:
-        row, column = place(cell)
+        row, column = location(cell)
         number = CLASSES.index(cell.kind)
         axes.add_patch(_square(column, row, _COLOURS[number]))
         axes.text(column, row, _LETTERS[number], ha="center", va="center", fontsize=9, fontweight="bold")
@@ -116,18 +116,18 @@ def _limit(axes: Axes, feared: np.ndarray) -> None:
                 axes.plot([column - 0.5, column + 0.5], [row + 0.5] * 2, **style)
 
 
-def _legend(fig, made: Map) -> None:
+def _legend(fig, result: Map) -> None:
     """The classes that are on the map, and the line."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    seen = [kind for kind in CLASSES if any(cell.kind == kind for cell in made.cells)]
+    seen = [kind for kind in CLASSES if any(cell.kind == kind for cell in result.cells)]
     marks: list[Any] = [
         Patch(facecolor=_COLOURS[CLASSES.index(kind)], edgecolor="0.6",
               label=f"{_LETTERS[CLASSES.index(kind)]}  {_WORDS[_LETTERS[CLASSES.index(kind)]]}".strip())
         for kind in seen
     ]  # fmt: skip
-    predicted = [bool(cell.predicted) for cell in made.cells]
+    predicted = [bool(cell.predicted) for cell in result.cells]
     if all(predicted):
         marks.append(Line2D([], [], lw=0, label="all predicted to be amiss"))
     elif any(predicted):

@@ -16,7 +16,7 @@ CLASSES = ("stable", "wrong", "turned", "locked", "stretched", "diverged", "no r
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapCell:
     """One setting: its class, the numbers that made it, and what was predicted ("" for nothing to fear)."""
 
     setting: Setting
@@ -32,7 +32,7 @@ class Map:
 
     title: str
     axes: tuple[Axis, ...]
-    cells: tuple[Cell, ...]
+    cells: tuple[MapCell, ...]
     about: Mapping[str, Any]
 
     @property

@@ -29,7 +29,7 @@ from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import Axis, Setting, combinations
 from ..tables import measured, study_members, write_csv, write_json
-from .results import Cell, Map
+from .results import Map, MapCell
 
 if TYPE_CHECKING:
     from ...io.reader import RunFile
@@ -39,7 +39,7 @@ TABLE, DETAILS, FIGURE = "stability.csv", "stability.json", "stability.png"
 STRETCH, LOCKED, TURN, PLACE = 0.02, 10.0, 0.1, 0.05
 FINER, SLIP = 4, 0.01
 
-Say = Callable[[str], object]
+Log = Callable[[str], object]
 
 
 def stability(
@@ -50,7 +50,7 @@ def stability(
     *,
     jobs: int = 1,
     executor: Executor | None = None,
-    say: Say = print,
+    log: Log = print,
 ) -> Map:
     """Run every cell and its finer run; write stability.csv, stability.json and stability.png into ``folder``.
 
@@ -66,17 +66,17 @@ def stability(
         predictions.append(predicted)
     references = list(shared.values())
     run_members(
-        references, folder / "finer", jobs=jobs, executor=executor, say=lambda line: say(f"finer run of {line}")
+        references, folder / "finer", jobs=jobs, executor=executor, log=lambda line: log(f"finer run of {line}")
     )
-    outcomes = run_members(members, folder / "runs", jobs=jobs, executor=executor, say=say)
+    outcomes = run_members(members, folder / "runs", jobs=jobs, executor=executor, log=log)
     cells = tuple(
         _cell(setting, outcome, None if best is None else folder / "finer" / f"{best.name}.h5", predicted)
         for setting, outcome, best, predicted in zip(settings, outcomes, finer, predictions, strict=True)
     )
     title = next((_title(member) for member in members if _title(member)), "")
-    made = Map(title, tuple(axes), cells, measured())
-    _write(made, folder)
-    return made
+    result = Map(title, tuple(axes), cells, measured())
+    _write(result, folder)
+    return result
 
 
 def _title(member: Member) -> str:
@@ -131,18 +131,18 @@ def _predicted(simulation: Any) -> str:
     return "wrong" if fast > 1.01 * ACCURATE_OMEGA_DT else ""
 
 
-def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str) -> Cell:
+def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str) -> MapCell:
     from ...io.reader import RunFile
 
     if not outcome.done:
-        return Cell(setting, "diverged", {}, predicted, outcome.message)
+        return MapCell(setting, "diverged", {}, predicted, outcome.message)
     if finer is None or not finer.exists():
-        return Cell(setting, "no reference", {}, predicted, "the finer run could not be made")
+        return MapCell(setting, "no reference", {}, predicted, "the finer run could not be made")
     with RunFile(outcome.path) as run, RunFile(finer) as best:
         if best.status not in ("finished", "stopped"):
-            return Cell(setting, "no reference", {}, predicted, f"the finer run: {best.reason}")
+            return MapCell(setting, "no reference", {}, predicted, f"the finer run: {best.reason}")
         found = compared(run, best)
-    return Cell(setting, classed(found), found, predicted, "")
+    return MapCell(setting, classed(found), found, predicted, "")
 
 
 def compared(run: RunFile, best: RunFile) -> dict[str, float]:
@@ -181,7 +181,7 @@ def classed(found: Mapping[str, float]) -> str:
     return "wrong" if found["place"] > PLACE else "stable"
 
 
-def rows(made: Map) -> list[dict[str, Any]]:
+def rows(result: Map) -> list[dict[str, Any]]:
     """Return the table: a row a cell."""
     return [
         {
@@ -191,14 +191,14 @@ def rows(made: Map) -> list[dict[str, Any]]:
             **cell.numbers,
             "message": cell.message,
         }
-        for cell in made.cells
+        for cell in result.cells
     ]
 
 
-def _write(made: Map, folder: Path) -> None:
+def _write(result: Map, folder: Path) -> None:
     from .figure import draw
 
-    write_csv(folder / TABLE, rows(made))
+    write_csv(folder / TABLE, rows(result))
     limits = {"stretch": STRETCH, "force": LOCKED, "turn": TURN, "place": PLACE}
-    write_json(folder / DETAILS, {"title": made.title, **made.about, "limits": limits, "cells": rows(made)})
-    draw(made, folder / FIGURE)
+    write_json(folder / DETAILS, {"title": result.title, **result.about, "limits": limits, "cells": rows(result)})
+    draw(result, folder / FIGURE)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Tried:
+class Trial:
     """A setting, its errors by measure (empty where it failed), and seconds a unit of simulated time, one a repeat."""
 
     setting: Setting
@@ -37,19 +37,19 @@ class Trade:
     title: str
     reference: Reference
     measures: tuple[str, ...]
-    tried: tuple[Tried, ...]
+    trials: tuple[Trial, ...]
     fronts: Mapping[str, tuple[int, ...]]
     about: Mapping[str, Any]
 
-    def cheapest(self, error: float) -> Tried | None:
+    def cheapest(self, error: float) -> Trial | None:
         """Return the cheapest setting of which all errors, with the reference's own added, are at most ``error``."""
-        good = [one for one in self.tried if one.errors and all(self.error(one, m) <= error for m in self.measures)]
+        good = [one for one in self.trials if one.errors and all(self.error(one, m) <= error for m in self.measures)]
         return min(good, key=lambda one: one.cost, default=None)
 
-    def error(self, one: Tried, measure: str) -> float:
+    def error(self, one: Trial, measure: str) -> float:
         """What a setting's error may be: as found, and the reference's own."""
         return one.errors[measure] + self.reference.estimate(measure)
 
-    def uncertain(self, one: Tried, measure: str) -> bool:
+    def uncertain(self, one: Trial, measure: str) -> bool:
         """Whether an error is under what the reference can tell."""
         return one.errors[measure] < self.reference.estimate(measure)

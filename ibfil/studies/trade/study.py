@@ -25,7 +25,7 @@ from ..members import run_members
 from ..settings import Axis, Setting, combinations, source
 from ..tables import measured, study_members, write_csv, write_json
 from .reference import NOMINAL, POSITION, Reference, distances, prove
-from .results import Trade, Tried
+from .results import Trade, Trial
 
 if TYPE_CHECKING:
     from ...case.schema import Case
@@ -35,7 +35,7 @@ TABLE, DETAILS, FIGURE = "trade.csv", "trade.json", "trade.png"
 CLOCKS = ("wall", "processor")
 _SPACE = ("nodes", "spacing")  # keys that change the nodes
 
-Say = Callable[[str], object]
+Log = Callable[[str], object]
 
 
 def trade(
@@ -50,7 +50,7 @@ def trade(
     budget: float | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
-    say: Say = print,
+    log: Log = print,
 ) -> Trade:
     """Measure every combination of ``axes`` and write trade.csv, trade.json and trade.png into ``folder``.
 
@@ -71,23 +71,23 @@ def trade(
         def heed(line: str = "") -> None:
             """End it also where the interrupt was lost: one that comes while the garbage collector calls back."""
             if line:
-                say(line)
+                log(line)
             if left():
                 raise Interrupted
 
         def run(some: Sequence[Member], where: Path) -> list[Outcome]:
-            return run_members(some, where, jobs=jobs, executor=executor, say=heed)
+            return run_members(some, where, jobs=jobs, executor=executor, log=heed)
 
         reference = prove(case, overrides, folder, asked, nodes, run)
         heed()
-        measures = _proved(reference, asked, say)
-        _rounds(members, folder / "runs", repeat, run, left, say)
-    tried = tuple(_tried(one, folder / "runs", repeat, clock, reference, measures) for one in settings)
-    fronts = {name: front([one.cost for one in tried], [one.errors.get(name) for one in tried]) for name in measures}
+        measures = _proved(reference, asked, log)
+        _rounds(members, folder / "runs", repeat, run, left, log)
+    trials = tuple(_trial(one, folder / "runs", repeat, clock, reference, measures) for one in settings)
+    fronts = {name: front([one.cost for one in trials], [one.errors.get(name) for one in trials]) for name in measures}
     about = {**measured(), "repeats": repeat, "jobs": jobs, "clock": clock}
-    made = Trade(base.title, reference, measures, tried, fronts, about)
-    _write(made, folder)
-    return made
+    result = Trade(base.title, reference, measures, trials, fronts, about)
+    _write(result, folder)
+    return result
 
 
 def _measures(base: Case, observe: Sequence[str]) -> tuple[str, ...]:
@@ -98,16 +98,16 @@ def _measures(base: Case, observe: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(observe)) or known
 
 
-def _proved(reference: Reference, asked: Sequence[str], say: Say) -> tuple[str, ...]:
+def _proved(reference: Reference, asked: Sequence[str], log: Log) -> tuple[str, ...]:
     """The measures in which the reference holds; what is refused is told. Raises RunFailed where none is left."""
     for name in asked:
         for proof in reference.proofs[name]:
-            say(
+            log(
                 f"reference, {name} in {proof.direction}: order {proof.order:.2f} (nominal {NOMINAL:g}), "
                 f"error left {proof.estimate:.2g}"
             )
     for name in reference.refused:
-        say(f"{name} is refused: its order is not seen, so the reference proves nothing of it")
+        log(f"{name} is refused: its order is not seen, so the reference proves nothing of it")
     kept = tuple(name for name in asked if name not in reference.refused)
     if not kept:
         raise RunFailed(
@@ -122,7 +122,7 @@ def _budget(seconds: float | None) -> Iterator[Callable[[], bool]]:
     """Within it, and after so many seconds, the run under way is told to stop as by Ctrl-C; gives whether it was."""
     over: list[int] = []
 
-    def end(number: int, frame: object) -> None:
+    def end(number: int, snapshot: object) -> None:
         over.append(number)
         os.kill(os.getpid(), signal.SIGINT)
 
@@ -148,7 +148,7 @@ def _rounds(
     repeat: int,
     run: Callable[[Sequence[Member], Path], list[Outcome]],
     left: Callable[[], bool],
-    say: Say,
+    log: Log,
 ) -> None:
     """All members once, all again ...: what disturbs the machine for a while does not fall on one of them."""
     try:
@@ -157,12 +157,12 @@ def _rounds(
     except (Interrupted, KeyboardInterrupt):
         if not left():
             raise
-        say("the budget is used up; the same command goes on with what is left out")
+        log("the budget is used up; the same command goes on with what is left out")
 
 
-def _tried(
+def _trial(
     setting: Setting, where: Path, repeat: int, clock: str, reference: Reference, measures: Sequence[str]
-) -> Tried:
+) -> Trial:
     """What the repeats of a setting show."""
     from ...io.reader import RunFile
 
@@ -185,7 +185,7 @@ def _tried(
                 with RunFile(reference.path) as best:
                     found = distances(run, best)
                 errors = {name: found[name] for name in measures}
-    return Tried(setting, status, message.replace("\n", "; "), errors, tuple(seconds), tuple(processor))
+    return Trial(setting, status, message.replace("\n", "; "), errors, tuple(seconds), tuple(processor))
 
 
 def front(costs: Sequence[float], errors: Sequence[float | None]) -> tuple[int, ...]:
@@ -201,31 +201,33 @@ def front(costs: Sequence[float], errors: Sequence[float | None]) -> tuple[int, 
     return tuple(found)
 
 
-def rows(made: Trade) -> list[dict[str, Any]]:
+def rows(result: Trade) -> list[dict[str, Any]]:
     """Return the table: a row a setting."""
     out = []
-    for i, one in enumerate(made.tried):
+    for i, one in enumerate(result.trials):
         row: dict[str, Any] = {**one.setting.values, "status": one.status}
         if one.seconds:
             row |= {"seconds": one.cost, "seconds_most": max(one.seconds), "processor": min(one.processor)}
         for name, error in one.errors.items():
-            marks = ["front"] * (i in made.fronts[name]) + ["under the reference's error"] * made.uncertain(one, name)
+            marks = ["front"] * (i in result.fronts[name]) + ["under the reference's error"] * result.uncertain(
+                one, name
+            )
             row |= {name: error, f"{name}_marks": ", ".join(marks)}
         out.append({**row, "message": one.message})
     return out
 
 
-def details(made: Trade) -> dict[str, Any]:
+def details(result: Trade) -> dict[str, Any]:
     """Return everything, ready for JSON."""
-    reference = made.reference
+    reference = result.reference
     return {
-        "title": made.title,
-        **made.about,
+        "title": result.title,
+        **result.about,
         "cost": "seconds a unit of simulated time: the least of the repeats, without start-up and first step",
         "reference": {
             "overrides": reference.overrides,
-            "error": {name: reference.estimate(name) for name in made.measures},
-            "error_of_the_case_s_nodes": {name: reference.of_nodes(name) for name in made.measures},
+            "error": {name: reference.estimate(name) for name in result.measures},
+            "error_of_the_case_s_nodes": {name: reference.of_nodes(name) for name in result.measures},
             "refused": reference.refused,
             "proofs": {name: [asdict(proof) for proof in proofs] for name, proofs in reference.proofs.items()},
         },
@@ -237,16 +239,16 @@ def details(made: Trade) -> dict[str, Any]:
                 "errors": one.errors,
                 "seconds": one.seconds,
                 "processor": one.processor,
-                "front": [name for name in made.measures if i in made.fronts[name]],
+                "front": [name for name in result.measures if i in result.fronts[name]],
             }
-            for i, one in enumerate(made.tried)
+            for i, one in enumerate(result.trials)
         ],
     }
 
 
-def _write(made: Trade, folder: Path) -> None:
+def _write(result: Trade, folder: Path) -> None:
     from .figure import draw
 
-    write_csv(folder / TABLE, rows(made))
-    write_json(folder / DETAILS, details(made))
-    draw(made, folder / FIGURE)
+    write_csv(folder / TABLE, rows(result))
+    write_json(folder / DETAILS, details(result))
+    draw(result, folder / FIGURE)

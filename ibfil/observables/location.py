@@ -37,7 +37,7 @@ _NAMED: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 
 
-class Place:
+class Location:
     """One point, or the points of a window: its nodes and its two ends.
 
     ``s`` (N,) is the nodes' arclength, ``at`` start, finish, middle, centroid, an arclength or a window [s1,

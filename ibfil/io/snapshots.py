@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class FilamentFrame:
+class FilamentSnapshot:
     """One filament of N nodes at one time, in the case's units; lab frame unless said otherwise."""
 
     position: np.ndarray  # (N, 3), unwrapped
@@ -33,10 +33,10 @@ class FilamentFrame:
 
 
 @dataclass(frozen=True)
-class Frame:
+class Snapshot:
     """All filaments at one time, with the diagnostics taken at outputs and the fields where they were asked for."""
 
     time: float
-    filaments: dict[str, FilamentFrame]
+    filaments: dict[str, FilamentSnapshot]
     diagnostics: dict[str, float | np.ndarray]
     grid: dict[str, np.ndarray] | None = None
