@@ -126,7 +126,7 @@ def test_check_lists_each_term_with_its_share_and_no_other():
         assert all(time >= 0 and size >= 0 for _, time, size in found)
     text = report(case(*GRID))
     assert "flow between nodes (table)" in text
-    assert "fields put out" not in text
+    assert "fields written" not in text
     inertia = Simulation(case("fluid.model=navier-stokes", "fluid.density=1"))
     assert "inertia and advection" in [term.name for term in terms(inertia, memory(inertia))]
 
