@@ -35,7 +35,7 @@ class RunFailed(Exception):
         self.cause, self.advice = cause, advice
 
     def __str__(self) -> str:
-        """What, when, where; the likely cause; what to change: a line each."""
+        """Message, time and place; the likely cause; the remedy: a line each."""
         where = ""
         if self.filament is not None:
             where = f" on filament {self.filament}" + ("" if self.node is None else f", node {self.node}")

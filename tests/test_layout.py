@@ -6,6 +6,7 @@ The rules are in CONTRIBUTING.md. All imports count: at load, in functions, and 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from functools import cache
@@ -85,9 +86,10 @@ def test_every_package_has_its_place_in_the_order():
     assert {name.split(".")[0] for name in modules()} == set(ORDER)
 
 
-@pytest.mark.parametrize("name", sorted(modules()))
-def test_imports_run_down_the_order(name):
-    assert not [other for other in imports(name) if other in modules() and rank(other) > rank(name)]
+def test_imports_run_down_the_order():
+    for name in modules():
+        upward = [other for other in imports(name) if other in modules() and rank(other) > rank(name)]
+        assert upward == [], name
 
 
 def test_rods_and_fluids_are_apart_and_the_method_knows_no_case():
@@ -274,3 +276,12 @@ def test_the_names_promised_to_python_are_there():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "False" not in done.stdout
     assert ibfil.__all__
+
+
+def test_docstrings_say_first_what_a_thing_is_or_returns():
+    """A noun of the field, and no sentence that begins with "What"."""
+    for name in modules():
+        for node in ast.walk(parsed(name)):
+            if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+                text = " ".join((ast.get_docstring(node) or "").split())
+                assert not re.search(r"(^|[.:;] )What [a-z]", text), f"{name}: {text[:80]}"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Flow(Protocol):
-    """What knows the flow of a run."""
+    """The flow of a run."""
 
     def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3); CaseError for times it does not know."""

@@ -29,7 +29,7 @@ PLAIN = View()
 
 
 class Rod(NamedTuple):
-    """What a filament keeps through a run: arclength (N,), and the radius (N,) of the tube it is shown as."""
+    """The constants of a filament in a run: arclength (N,), and the radius (N,) of the tube it is shown as."""
 
     s: np.ndarray
     radius: np.ndarray

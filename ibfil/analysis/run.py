@@ -1,4 +1,4 @@
-"""A run opened from Python for analysis: `ibfil.open`. What io/reader.py reads, and its flow, meshes, dataset."""
+"""A run opened from Python for analysis: `ibfil.open`. All that io/reader.py reads, and flow, meshes, dataset."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is in a run file, as text, JSON, a table, or one figure: `ibfil show`."""
+"""The summary of a run file as text, JSON or a table: `ibfil show`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a step costs, from counts alone: so that the same case always takes the same method, on any machine.
+"""Seconds of a step, from counts alone, so that the same case always takes the same method, on any machine.
 
 The constants are of one thread of a machine of 2025; only their ratios decide anything.
 """

@@ -23,7 +23,7 @@ def flow(case: Case) -> Flow | None:
 
 
 def flow_parts(case: Case) -> list[Part] | None:
-    """What the case's background flow is the sum of: fixed fields times factors in time; None: it is no such sum."""
+    """The background flow as a sum of fixed fields times factors in time; None where it is no such sum."""
     found = products(case.fluid.flow or ())
     return None if found is None else [_part(one) for one in found]
 

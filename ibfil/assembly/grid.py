@@ -71,7 +71,7 @@ def twist_radius(case: Case) -> float:
 
 
 def coupling(case: Case, stacked: RodStack) -> Coupling:
-    """What of a node goes through the grid."""
+    """The coupling of nodes to the grid."""
     if not case.couples_torque:
         from ..fluids.coupling import TRANSLATION
 

@@ -1,7 +1,6 @@
-"""From a case to its rods, stacked, with their law, ends, loads and contact; its thermal noise; and its scheme.
+"""From a case to its rods, stacked, with their law, ends, loads and contact.
 
-The fluid is assembled in assembly/fluids/base.py. What the case does not name is not built: the step asks nothing about
-it.
+The fluid is assembled in assembly/fluids. Nothing is built that the case does not name: the step asks nothing about it.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What a scene may say: the case file, read, checked, and all its faults told at once."""
+"""The case file: read, checked, and all its faults reported at once."""

@@ -1,4 +1,4 @@
-"""What does not go together in a case whose single values are all allowed. Checks yield faults.
+"""Inconsistencies of a case whose single values are all allowed. Checks yield faults.
 
 A fault names in ``reads`` the other keys it rests on: where one of them is at fault itself, this is not told.
 """

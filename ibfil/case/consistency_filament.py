@@ -1,4 +1,4 @@
-"""What does not go together in one filament of a case: its moduli, its place, its shape, its ends."""
+"""Inconsistencies within one filament of a case: its moduli, its place, its shape, its ends."""
 
 from __future__ import annotations
 

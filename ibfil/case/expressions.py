@@ -38,7 +38,7 @@ Parameters = Mapping[str, float | None]
 
 
 class ExpressionError(ValueError):
-    """What is wrong with an expression, as a clause that fits in brackets."""
+    """A fault of an expression, as a clause that fits in brackets."""
 
 
 class BrokenParameter(ExpressionError):

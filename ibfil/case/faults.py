@@ -50,14 +50,14 @@ def shown(value: Any) -> str:
 
 
 class Entry(NamedTuple):
-    """What the schema knows of a path: its hint with pydantic's metadata, and the table it stands in."""
+    """The schema's entry for a path: its hint with pydantic's metadata, and the table it stands in."""
 
     hint: Any
     metadata: tuple[Any, ...]
     table: type[BaseModel] | None
 
     def allowed(self) -> str:
-        """What may stand there."""
+        """The values that are allowed there."""
         hint = unwrapped(self.hint)
         if (
             get_origin(hint) is dict
@@ -107,7 +107,7 @@ ROOT = Entry(Scene, (), None)
 
 
 def entry_of(path: Sequence[str | int]) -> Entry | None:
-    """What the schema knows of a whole path."""
+    """The schema's entry for a whole path."""
     entry: Entry | None = ROOT
     for part in path:
         entry = step_into(entry, part) if entry else None

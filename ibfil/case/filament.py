@@ -34,7 +34,7 @@ from .values import (
 
 
 class AnyLaw(Table):
-    """What all constitutive laws have."""
+    """The base of the constitutive laws."""
 
     kind: str
 
@@ -221,14 +221,14 @@ class Filament(Table):
 
     @property
     def aligned(self) -> str:
-        """What of the shape points along ``direction``: axis, tangent or chord."""
+        """The direction of the shape that points along ``direction``: axis, tangent or chord."""
         if self.align != "auto":
             return self.align
         return "axis" if self.shape.has_axis else "tangent"
 
 
 def copy_name(name: str, number: int) -> str:
-    """What copy ``number``, from 0 on, of a filament is called: NAME_003."""
+    """The name of copy ``number``, from 0 on, of a filament: NAME_003."""
     return f"{name}_{number:03d}"
 
 

@@ -18,7 +18,7 @@ from .values import (
 
 
 class Contact(Table):
-    """What happens where filaments touch."""
+    """Contact of filaments."""
 
     action: Literal["stop", "warn", "repel"] = Field("stop", description="what to do at contact")
     distance: Positive | None = Field(None, description="distance of the axes at contact; absent: the sum of radii")

@@ -88,5 +88,5 @@ def _bad_number(path: tuple[str, ...], items: list[Any]) -> Fault | None:
 
 
 def _empty(entry: Entry) -> Any:
-    """What a table or list that is not in the file starts as."""
+    """The empty table or list that a missing one starts as."""
     return [] if all(get_origin(member) is tuple for member in members(entry.hint)) else {}

@@ -261,7 +261,7 @@ def _leaves(table: dict[str, Any], path: tuple[str, ...]) -> Iterator[tuple[list
 
 
 def _quick_faults(raw: dict[str, Any], known: Sequence[Fault]) -> Iterator[Fault]:
-    """What is wrong with the quick forms, and not with the case itself."""
+    """The faults of the quick forms that the case itself has not."""
     entries = raw.get("expect")
     for name, entry in entries.items() if isinstance(entries, dict) else ():
         if not (isinstance(entry, dict) and isinstance(entry.get("quick"), dict) and entry["quick"]):

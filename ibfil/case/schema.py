@@ -1,7 +1,7 @@
 """Every table and key of a case file, as frozen descriptions: each key with its default and its meaning.
 
-The tables of a filament are in ``case_filament``. What one value may be is in ``case_values``; what does not
-go together is in ``case_checks``. Some defaults depend on other tables: ``case.parse_case`` fills those in
+The tables of a filament are in filament.py and shape.py, kinds of value in values.py, checks between keys in
+consistency.py. Some defaults depend on other tables: reading.py fills those in
 before it reads, and the text here says so.
 """
 
@@ -155,7 +155,7 @@ class Expect(Table):
 
 
 class Output(Table):
-    """What is written, and when."""
+    """Outputs: their times and their content."""
 
     every: Positive | None = Field(None, description="time between outputs, hit exactly; this or times is required")
     times: Annotated[tuple[NotNegative, ...], Listed()] | None = Field(None, description="the times, instead of every")

@@ -1,7 +1,7 @@
 """Expressions in time and space as sums of products f(t) g(x, y, z): a flow that is one is put on a grid once.
 
 Sums, products, quotients and whole powers are taken apart, and sin and cos of a(x, y, z) + b(t), as in travelling
-waves, by the addition theorems; not exp, whose two factors may overflow. What else mixes time and place is not.
+waves, by the addition theorems; not exp, whose two factors may overflow. Nothing else that mixes time and place is.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class Noise(Table):
 
 
 class Shape(Table):
-    """What all start shapes have."""
+    """The keys that all start shapes have."""
 
     perturb: TripleS = Field((ZERO, ZERO, ZERO), description="added to r in the lab frame after placing")
     twist: OfS = Field(ZERO, description="Omega3 added to the shape's own, by turning e1 about e3")

@@ -1,4 +1,4 @@
-"""What every table of a case is."""
+"""The base of every table of a case."""
 
 from __future__ import annotations
 

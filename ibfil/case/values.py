@@ -1,4 +1,4 @@
-"""What one value of a case may be: numbers and formulas as text, words, lists. Each kind reads itself.
+"""The kinds of value in a case: numbers and formulas as text, words, lists. Each kind reads itself.
 
 A kind stands in a type hint, ``Annotated[float, Number()]``, and gives pydantic the reader, the JSON Schema,
 the listing and the messages their words: one place, so they cannot disagree.
@@ -44,11 +44,11 @@ class Kind:
     words: tuple[str, ...] = ()
 
     def says(self) -> str:
-        """What is allowed, for the messages and the listing."""
+        """The allowed values, for messages and the listing."""
         return " or ".join([self._values(), *(f'"{word}"' for word in self.words)])
 
     def _values(self) -> str:
-        """What is allowed besides the words."""
+        """The allowed values besides the words."""
         raise NotImplementedError
 
     def _schema(self) -> list[dict[str, Any]]:
@@ -195,7 +195,7 @@ class Listed:
         return {"anyOf": [whole["prefixItems"][0], whole]} if self.repeat else whole
 
 
-# The hints of the schema. What a list holds is read by pydantic, so each item's fault has its own key.
+# The hints of the schema. Items of a list are read by pydantic, so each item's fault has its own key.
 Real = Annotated[float, Number()]
 Positive = Annotated[float, Number(low=0)]
 NotNegative = Annotated[float, Number(low=0, open=False)]
@@ -234,7 +234,7 @@ def by_kind(default: str, *kinds: str) -> Discriminator:
 
 
 def describe(hint: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """What a type hint of the schema allows, in a few words."""
+    """The values that a type hint of the schema allows, in a few words."""
     for item in metadata:
         if isinstance(item, Kind):
             return item.says()

@@ -1,1 +1,1 @@
-"""What `ibfil check` says: what is modelled, dimensionless groups, costs, warnings."""
+"""The overview before a run: effects modelled, dimensionless groups, costs, warnings."""

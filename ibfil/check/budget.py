@@ -1,4 +1,4 @@
-"""What a run takes: bytes of memory and disk, and the share of each modelled term in a step. Counted, not measured.
+"""The budget of a run: bytes of memory and disk, and the share of each modelled term in a step. Counted, not measured.
 
 Only what a case names is counted, because only that is built. Shares of time are of one step, outputs spread over the
 steps between them; that of the rods and of the fluid are those by which the method is chosen (assembly/costs.py), the

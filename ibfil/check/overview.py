@@ -1,4 +1,4 @@
-"""What is told of a scene before it runs: its dimensionless groups, and what to look twice at."""
+"""The overview of a scene before it runs: its dimensionless groups, and warnings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `ibfil check` says: what a case models and what it does not, what it costs, which steps are stable."""
+"""The report of `ibfil check`: effects modelled and not, costs, stable steps, warnings."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _thermal(thermal: Thermal) -> str:
 
 
 def absent(case: Case) -> list[str]:
-    """What is left out, and so costs nothing."""
+    """The effects that are left out, and so cost nothing."""
     out, fluid = [], fluid_model(case)
     if not case.twists:
         out.append("twist: no twist unknowns; e1 is carried along")

@@ -1,6 +1,6 @@
-"""What in a scene should make its user look twice: it runs, but may not mean what is thought.
+"""Warnings about a scene that runs, but may not mean what is thought.
 
-What a fluid has to say of it is with its model (assembly/fluids).
+Those that a fluid brings are with its model (assembly/fluids).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _of_held_ends(key: str, filament: Filament) -> list[str]:
 
 
 def _of_noise(simulation: Simulation) -> list[str]:
-    """What thermal forces ask of the rods and of the step (derivations.md, section 5)."""
+    """Warnings about thermal forces: on the rods and on the step (derivations.md, section 5)."""
     case = simulation.case
     out: list[str] = []
     if case.thermal is None or case.thermal.energy == 0:

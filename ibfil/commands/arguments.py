@@ -1,4 +1,4 @@
-"""What the commands share: kinds of arguments, the case that words name, lines to the screen."""
+"""The common part of the commands: kinds of arguments, the case that words name, lines to the screen."""
 
 from __future__ import annotations
 

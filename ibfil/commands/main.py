@@ -86,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _damages(arguments: argparse.Namespace) -> list[str]:
-    """What is wrong with the run file a command has read; where nothing is, an error is the program's own fault."""
+    """The damages of the run file a command has read; where there are none, an error is the program's own fault."""
     path = getattr(arguments, "run", None) or getattr(arguments, "resume", None)
     if path is None:
         return []

@@ -72,7 +72,7 @@ def _threads_of(run: str) -> int:
 
 
 def _end(result: Result, changes: str = "") -> int:
-    """What a run ends with: the file, how it ended, the observables, and what was expected before ``changes``."""
+    """Print the end of a run: the file, how it ended, the observables, and what was expected before ``changes``."""
     from ..analysis.summary import digest, duration, results
     from ..io.reader import RunFile
 

@@ -32,7 +32,7 @@ class Part(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """What a fluid returns, each (n, m): the move, the force the fluid felt, and what of it the supports gave."""
+    """A fluid's solution, each (n, m): the displacement, the force on the fluid, the reactions within that."""
 
     move: np.ndarray
     force: np.ndarray  # elastic force and loads as they acted over the step, reactions included
@@ -78,7 +78,7 @@ class Fluid(Protocol):
         """The velocity (k, 3) at ``points`` (k, 3) when nodes r (n, 3), tangents e3, push with forces (n, m)."""
 
     def memory(self) -> dict[str, np.ndarray | float]:
-        """What the fluid carries from step to step, by name; part of a run's state. Empty for most."""
+        """The state that the fluid carries from step to step, by name; part of a run's state. Empty for most."""
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:
         """Takes up what ``memory`` gave."""

@@ -44,7 +44,7 @@ PLACES = 8  # of the rod within a cell, for each direction
 
 @dataclass(frozen=True)
 class Rod:
-    """What drag depends on, beside the viscosity: the rod's length and nodes, and the grid it is dragged through."""
+    """The rod that drag is measured on: its length and nodes, and the grid it is dragged through."""
 
     length: float
     nodes: int
@@ -201,7 +201,7 @@ def cache_file(rod: Rod) -> Path:
 
 
 def _recall(path: Path, rod: Rod) -> Match | None:
-    """What the file says; None where there is none, or a damaged one, which costs a measurement and nothing else."""
+    """The drag in a file; None where there is none, or a damaged one, which costs a measurement and nothing else."""
     try:
         kept = json.loads(path.read_text())
         found = Match(**kept["drag"])

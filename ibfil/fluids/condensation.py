@@ -76,7 +76,7 @@ class Reduced(Protocol):
         """The forces (c n,) that moves d (c n,) give."""
 
     def frozen(self) -> RodStiffness:
-        """What the matrices of single rods are made of."""
+        """The stiffness from which matrices of single rods are made."""
 
     def whole(self, d: np.ndarray) -> np.ndarray:
         """The moves (n, m) of all unknowns from those (c n,) of these."""

@@ -1,4 +1,4 @@
-"""What of a node goes through the grid: its force and velocity (`Translation`), or torque and spin with them.
+"""The coupling of nodes to the grid: by force and velocity (`Translation`), or torque and spin with them.
 
 `Coupling` is the interface; torque_coupling.py has the other one.
 """
@@ -18,7 +18,7 @@ from .mobility_table import mobility, pairs, point_response
 
 
 class Coupling(Protocol):
-    """What of a node goes through the grid: ``components`` numbers of it, c below, forces in and motions out.
+    """The numbers of a node that go through the grid, ``components`` of it, c below: forces in and motions out.
 
     On the grid these are ``grid_vectors`` vectors a node, v below: the force, and the torque with it.
     """
@@ -38,10 +38,10 @@ class Coupling(Protocol):
         """The mobility (c k, c l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
 
     def own(self, slip: np.ndarray) -> np.ndarray:
-        """What each node moves by its own force or torque beyond the grid's answer, (n, c), given the slip (n,)."""
+        """The self-mobility (n, c) of nodes beyond the grid's response, given the slip (n,)."""
 
     def axes(self, e3: np.ndarray) -> np.ndarray:
-        """What nodes with tangents e3 (n, 3) spin about, (n, 3); zero where they do not."""
+        """The axes (n, 3) about which nodes with tangents e3 (n, 3) spin; zero where they do not."""
 
     def to_grid(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The vectors (n, 3 v) that go onto the grid, of forces (n, m), m at least c."""

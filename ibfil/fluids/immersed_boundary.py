@@ -1,10 +1,10 @@
-"""What all immersed-boundary fluids share: the implicit statement on a grid's mobility, whatever evaluates it.
+"""The common part of immersed-boundary fluids: the implicit statement on a grid's mobility, whatever evaluates it.
 
     u = u0 + (J L^-1 S + s) F          (Eq. 45 of the paper, with +f)
 
 S spreads nodal forces with a discrete delta kernel, L^-1 is the fluid's solve, J interpolates back (S transposed, times
 the cell's volume), s is the slip mobility that keeps nearly inextensible rods from locking when their nodes are closer
-than the grid (numerics.md, 4.3). What of a node goes through the fluid is told by its coupling: forces and velocities
+than the grid (numerics.md, 4.3). A coupling says what of a node goes through the fluid: forces and velocities
 (mobility_table.py), or torques and spins with them (torque_coupling.py). Reactions of supports are spread like any
 force.
 """
@@ -28,7 +28,7 @@ from .coupling import TRANSLATION, Coupling, Nodes
 
 @dataclass(frozen=True)
 class Immersed:
-    """What every grid fluid is made of: grid, kernel, eta, slip (n,), drag against spin (n,) or None, background flow.
+    """The ingredients of a grid fluid: grid, kernel, eta, slip (n,), drag against spin (n,) or None, background flow.
 
     The drag is that of rods whose turns do not go through the grid; None where nothing twists or all goes through it.
     ``filaments`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number``
@@ -53,7 +53,7 @@ class Immersed:
 
     @cached_property
     def own(self) -> np.ndarray:
-        """What each node moves by itself (n, c), beyond the grid's answer."""
+        """The self-mobility (n, c) of each node beyond the grid's response."""
         return self.coupling.own(self.slip)
 
     def stencil(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +82,7 @@ def slip_mobility(fraction: float, kernel: Kernel, grid: Grid, viscosity: float,
 
 
 class ImmersedResponse(ABC):
-    """Positions frozen over a step of effective length tau. What evaluates the mobility is a subclass's.
+    """Positions frozen over a step of effective length tau. Subclasses evaluate the mobility.
 
     c numbers of a node go through the grid.
     """

@@ -61,7 +61,7 @@ class Workspace:
             yield block
 
     def gather(self, nodes: Nodes, velocity: Callable[[Block], None]) -> np.ndarray:
-        """What nodes feel of the ``velocity`` that is put into each block: (n, 3), or half its vorticity too (n, 6)."""
+        """The values (n, 3) at nodes of the ``velocity`` put into each block, or with half its vorticity (n, 6)."""
 
         def modes(block: Block) -> None:
             velocity(block)

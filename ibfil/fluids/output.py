@@ -1,4 +1,4 @@
-"""What is written of a fluid at an output: the heat it makes, and fields where it has a grid."""
+"""The outputs of a fluid besides the motion of nodes: the heat it makes, and fields where it has a grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .immersed_boundary import Immersed
 
 
 class FluidOutput(Protocol):
-    """What a fluid writes when nodes of a configuration move with ``velocity`` and push with ``force`` (n, m)."""
+    """The outputs of a fluid when nodes of a configuration move with ``velocity`` and push with ``force`` (n, m)."""
 
     def dissipation(
         self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float

@@ -121,7 +121,7 @@ class Matrix(NamedTuple):
 
 
 class Preconditioner(Protocol):
-    """What solves the systems of a response; ``keeps``: it has the factors of the last one again."""
+    """A solver for the systems of a response; ``keeps``: it has the factors of the last one again."""
 
     keeps: bool
 
@@ -148,7 +148,7 @@ class WholeMatrix:
 
 
 class _Source(NamedTuple):
-    """What kept factors were made from."""
+    """The source of kept factors."""
 
     nodes: Nodes
     tau: float
@@ -193,7 +193,7 @@ class RodByRod:
         self.kept.renew(self._matrix.factored(source.nodes, source.tau, source.rods, self._rods), source.tau)
 
     def memory(self) -> dict[str, np.ndarray | float]:
-        """What the factors were made from; empty before there are any."""
+        """The source of the factors; empty before there are any."""
         if self._source is None:
             return {}
         rods = {name: value for name, value in self._source.rods._asdict().items() if value is not None}

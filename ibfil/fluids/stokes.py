@@ -31,7 +31,7 @@ from .preconditioner import Asked, Matrix, Preconditioner, RodByRod, WholeMatrix
 
 
 class Solver(Protocol):
-    """What turns the vectors that nodes put on the grid into those they take off it, by FFT: whole, or pruned."""
+    """A map by FFTs, whole or pruned, from the vectors that nodes put on the grid to those they take off it."""
 
     def velocity(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
         """The velocities (n, 3 v) that forces (n, 3 v) with stencils (base, weights) drive at their own nodes.
@@ -231,7 +231,7 @@ class StokesByKrylov(StokesByFFT):
         return self.kept
 
     def memory(self) -> dict[str, np.ndarray | float]:
-        """What the kept factors were made from; empty before there are any."""
+        """The source of the kept factors; empty before there are any."""
         return self.kept.memory()
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:

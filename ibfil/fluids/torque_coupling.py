@@ -229,7 +229,7 @@ class TorqueCoupling:
         return np.column_stack([slip, slip, slip, self.spin])
 
     def axes(self, e3: np.ndarray) -> np.ndarray:
-        """What nodes with tangents e3 (n, 3) spin about, (n, 3)."""
+        """The axes (n, 3) about which nodes with tangents e3 (n, 3) spin."""
         return self.twists[:, None] * e3
 
     def to_grid(self, axes: np.ndarray, force: np.ndarray) -> np.ndarray:

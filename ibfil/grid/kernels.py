@@ -1,7 +1,7 @@
 """Discrete delta kernels: how a node is spread over the grid points around it, one axis at a time.
 
 A kernel of P points gives weights phi(x_k) at the grid points nearest to a node; the weights of the three axes
-multiply. What each kernel is physically was measured with the Fourier Stokes operator of this package, and
+multiply. The physical radii of each kernel were measured with the Fourier Stokes operator of this package, and
 tests/test_kernels.py measures it again. In units of the grid spacing h, to a part in 1000:
 
 point radius   of the sphere that moves like one node. The mean of the self mobility over 512 places of the node

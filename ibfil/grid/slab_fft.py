@@ -135,7 +135,7 @@ class SlabFFT:
             yield block
 
     def gather(self, nodes: Stencil, modes: Callable[[Block], None]) -> np.ndarray:
-        """What nodes feel, (n, fields), of the field whose modes ``modes`` puts into each block."""
+        """The values (n, fields) at the nodes of the field whose modes ``modes`` puts into each block."""
         cut = self._cut(nodes)
         planes, (room, _, backward) = self._room(cut.axis, cut.planes), self._lines(cut.axis)
         source, to = cut.across(room), cut.across(planes.modes)

@@ -14,7 +14,7 @@ _ROWS = 4096  # read at once
 
 
 def examine(path: Path) -> list[str]:
-    """What is wrong with a run file, in lines; none where all that a reader may ask for is there and can be read."""
+    """The damages of a run file, in lines; none where all that a reader may ask for is there and can be read."""
     try:
         with RunFile(path) as run:
             _look_at_all(run)

@@ -36,7 +36,7 @@ class Busy(Exception):
 
 
 class JournaledFile:
-    """What h5py needs of a file (seek, tell, readinto, write, truncate, flush), and `commit`.
+    """A file for h5py (seek, tell, readinto, write, truncate, flush), and `commit`.
 
     The file is first put back to its last commit; ``recovered`` says whether that was needed. With ``create``
     it need not be there. Raises Busy, and OSError where the file or its journal cannot be opened.

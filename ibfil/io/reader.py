@@ -344,7 +344,7 @@ def _check_format(file: h5py.File, path: Path) -> None:
 
 
 def other_format(version: int, written_by: str) -> str:
-    """What to do with a file of another format version."""
+    """The error for a file of another format version."""
     if version > FORMAT_VERSION:
         remedy = f"read it with ibfil {written_by} or later (pip install -U ibfil)"
     else:
@@ -353,7 +353,7 @@ def other_format(version: int, written_by: str) -> str:
 
 
 def damaged(path: Path) -> str:
-    """What is said of a file that cannot be read."""
+    """The error for a file that cannot be read."""
     line = f"{path}: is damaged or cut short"
     if checkpoint_path(path).exists():
         line += f"; `ibfil run --resume {path}` rebuilds it"

@@ -1,4 +1,4 @@
-"""What one output holds. simulation/diagnostics.py makes frames; run files, observables and pictures read them."""
+"""The content of one output. simulation/diagnostics.py makes it; run files, observables and pictures read them."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ _FIELDS = {
 
 
 class Meaning(NamedTuple):
-    """What a dataset holds: its dimension as in units.py, and words."""
+    """The meaning of a dataset: its dimension as in units.py, and words."""
 
     dimension: str
     description: str
@@ -172,7 +172,7 @@ class Recorder:
 
     @property
     def pace(self) -> tuple[float, float, float]:
-        """What the parts of the run before have noted: seconds, processor seconds, simulated time."""
+        """The pace noted by earlier parts of the run: seconds, processor seconds, simulated time."""
         return pace_of(self._open)
 
     @property
@@ -236,7 +236,7 @@ class Recorder:
         self.close()
 
     def close(self) -> None:
-        """Close the file. What was not written is lost."""
+        """Close the file. Rows that were not written are lost."""
         if self._h5 is not None:
             with contextlib.suppress(Exception):  # after a failed write HDF5 has lost the thread, and may
                 self._h5.close()

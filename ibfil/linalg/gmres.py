@@ -70,7 +70,7 @@ def factored(parts: list[tuple[slice, np.ndarray]], held: np.ndarray) -> Blocks:
 
 
 class GmresResult(NamedTuple):
-    """What GMRES found: x (n,), how many products it took, and whether x is within the tolerance."""
+    """The result of GMRES: x (n,), how many products it took, and whether x is within the tolerance."""
 
     x: np.ndarray
     products: int

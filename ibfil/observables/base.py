@@ -94,7 +94,7 @@ _SUMMARIES = {
 
 
 class ObservableBase:
-    """What the kinds of case files share: the keys `along`, `over` and `summary`. A kind adds ``sample``.
+    """The base of the kinds of a case: the keys `along`, `over` and `summary`. A kind adds ``sample``.
 
     ``keys`` are those that mean something to it; any other is refused. ``over`` is the window or None,
     ``axis`` the direction `along` (3,) or None, ``words`` says what the summary is.

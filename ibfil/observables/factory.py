@@ -38,7 +38,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
 
 
 def kinds_text() -> str:
-    """What each kind of observable is and which keys it has, for `ibfil schema`."""
+    """The kinds of observables and their keys, for `ibfil schema`."""
     from . import fitted, local  # noqa: F401  (they fill KINDS)
 
     lines = ["The kinds of [observe.NAME]: what each takes at an output, or of the run, and the keys it has"]

@@ -54,7 +54,7 @@ class Ends(Protocol):
 
 
 class NoContact:
-    """What a scene has in which nothing is asked about contact: rods may pass through each other."""
+    """No contact: rods may pass through each other."""
 
     def watch(self, before: np.ndarray, after: np.ndarray, start: float, end: float) -> str:
         """Nothing is looked for."""

@@ -135,7 +135,7 @@ class Contact:
         return search(self.segments, r, self.box, factor, margin)
 
     def watch(self, before: np.ndarray, after: np.ndarray, start: float, end: float) -> str:
-        """What a step from nodes ``before`` to ``after`` (n, 3), between two times, tells of first contact: "" if none.
+        """The first contact of a step from nodes ``before`` to ``after`` (n, 3), in words; "" if none.
 
         Raises Stopped, with that line, where contact stops a run.
         """
@@ -191,11 +191,11 @@ class Contact:
         return []
 
     def diagnostics(self, r: np.ndarray) -> dict[str, float]:
-        """What an output tells of it: pairs that touch now, at nodes r (n, 3), and when the first did."""
+        """Diagnostics of an output: pairs that touch now, at nodes r (n, 3), and the time of the first contact."""
         return {"contacts": float(self.near(r).i.size), "first_contact": self.since}
 
     def state(self) -> dict[str, float]:
-        """What a run must keep of it."""
+        """The part of a run's state that it is."""
         return {"first_contact": self.since}
 
     def restore(self, state: dict[str, float]) -> None:

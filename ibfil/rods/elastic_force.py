@@ -30,7 +30,7 @@ from .mesh import Mesh
 
 
 class Moment(NamedTuple):
-    """What a law makes of the strains: moments and their derivatives. Zero, both, at ends that carry none."""
+    """Moments of a constitutive law, and their derivatives. Zero, both, at ends that carry none."""
 
     bend: np.ndarray  # (n, 2) M1, M2 at nodes
     bend_slope: np.ndarray  # (n, 2, 2) dM_a/dO_b

@@ -18,7 +18,7 @@ from .mesh import Mesh
 
 
 class _Node(NamedTuple):
-    """What the stiffness needs of one node, in registers.
+    """The quantities of one node that the stiffness needs, in registers.
 
     With x = dr'' - l dr', l = (e3.r'')/|r'|, and dpsi the turn of e1 about e3: dM1 = m1.x + m1_psi dpsi, and so on.
     """

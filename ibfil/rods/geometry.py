@@ -22,7 +22,7 @@ class Configuration:
     """One configuration of n nodes. Half-node values are indexed by segment and zero where there is no segment.
 
     It is one ``table`` (n, 26), a row a node: compiled functions take one array in place of eleven, whose handing over
-    would cost more than what is done with them. What is in it are its attributes, views of the columns.
+    would cost more than the work on them. Its attributes are views of the columns.
     """
 
     __slots__ = ("table",)

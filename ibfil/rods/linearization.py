@@ -71,7 +71,7 @@ class Linearization:
         return (np.eye(3) - e3[:, :, None] * e3[:, None, :]) / self.configuration.metric[nodes][:, None, None]
 
     def _swing(self, nodes: np.ndarray) -> np.ndarray:
-        """What dpsi has of de3 (k, 3)."""
+        """The derivative of psi with respect to e3 (k, 3)."""
         e3, old = self.configuration.e3[nodes], self.start.e3[nodes]
         return cross(e3, old) / (1.0 + _dot(e3, old))
 

@@ -25,7 +25,7 @@ def _forces(rows: np.ndarray, unknowns: int) -> np.ndarray:
 
 
 class ExternalLoad:
-    """What a load is unless it says otherwise: nothing that pushes without end, and no moment at an end."""
+    """A load by default: one that does not push without end, and gives no moment to an end."""
 
     drives = False  # whether it pushes rods along for as long as it acts, as a spring does not
 
@@ -194,7 +194,7 @@ class EndMoment(ExternalLoad):
         return self.sign * given
 
     def _distance(self, configuration: Configuration) -> float:
-        """What Q is divided by."""
+        """The length by which Q is divided."""
         return float(configuration.length[self.half]) if self.torque_free else self.ds
 
     def add_force(self, configuration: Configuration, time: float, force: np.ndarray) -> None:

@@ -20,7 +20,7 @@ from ..linalg.finite_differences import clamped_weights, ghost_weights, weights
 
 
 class Mesh(NamedTuple):
-    """What the compiled kernels need to know of the rods; n nodes, stencils p wide, in the case's units."""
+    """The discretisation of the rods, as arrays for compiled kernels; n nodes, stencils p wide, in the case's units."""
 
     joined: np.ndarray  # (n,) bool: a segment joins node i and node i + 1
     ds: np.ndarray  # (n,) rest length of that segment (1 where there is none)

@@ -126,7 +126,7 @@ class RodSystem:
         return matrix
 
     def _add_stiffness(self, linearization: Linearization, time: float) -> None:
-        """What the kernels leave out: the part of M3 that comes from half nodes beside, and the loads."""
+        """Adds the terms that the kernels leave out: nonlocal twist, and the loads."""
         if self.law.nonlocal_twist is not None:
             linearization.nonlocal_twist(self._unit_responses(linearization.configuration), self.law.nonlocal_twist)
         for load in self.loads:

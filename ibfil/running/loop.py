@@ -33,7 +33,7 @@ _LOOK = 0.2  # seconds between two looks at clocks and progress
 
 @dataclass(frozen=True)
 class Result:
-    """What a run gave. ``status`` is finished, or stopped for the ``reason`` of a stop rule.
+    """The result of a run. ``status`` is finished, or stopped for the ``reason`` of a stop rule.
 
     ``snapshot`` is the last output; ``path`` the run file, None where none was written; ``wall_time`` in
     seconds.
@@ -173,7 +173,7 @@ class Loop:
         return "finished", ""
 
     def _look(self, due: Due) -> str:
-        """What is due now; the stop rule that is true, if one is."""
+        """The stop rule that is true at what is due now; "" where none is."""
         snapshot = self.simulation.snapshot(self._fields(due))
         if due.fields and snapshot.grid and self._recorder is not None:
             self._recorder.append_fields(snapshot.time, snapshot.grid)

@@ -1,4 +1,4 @@
-"""Running a case from its start, or on from a checkpoint. What happens on the way is in loop.py."""
+"""Running a case from its start, or on from a checkpoint. The loop between is in loop.py."""
 
 from __future__ import annotations
 

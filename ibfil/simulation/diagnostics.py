@@ -1,4 +1,4 @@
-"""What an output holds (io/frames.py), taken from a running simulation: filaments, diagnostics, fields where due."""
+"""The content of an output (io/snapshots.py), taken from a simulation: filaments, diagnostics, fields where due."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Diagnostics:
 
     @cached_property
     def _output(self) -> FluidOutput:
-        """What the fluid writes, made when it is first asked for."""
+        """The fluid's own outputs, made when they are first asked for."""
         return self._model.fluid_model.output(self._rods, self._model.fluid)
 
     def snapshot(self, now: SolvedState, fields: Sequence[str] = ()) -> Snapshot:

@@ -28,7 +28,7 @@ class Failure(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What is known of the step: its length, the scheme's limit (infinite where it has none), thermal kicks."""
+    """The facts of a step: its length, the scheme's limit (infinite where it has none), thermal kicks."""
 
     dt: float
     limit: float
@@ -43,7 +43,7 @@ class Step(NamedTuple):
         return otherwise
 
     def remedy(self, otherwise: str) -> str:
-        """What to change then."""
+        """The key to change then."""
         if self.dt > self.limit:
             return f"time.step below {self.limit:.3g}, or time.scheme=implicit"
         if self.kicked:
@@ -76,7 +76,7 @@ class Diverged(NamedTuple):
     node: int
 
     def trouble(self, step: Step) -> Failure:
-        """What to say of it."""
+        """The failure, for the user."""
         message = f"the run diverged: a position is no finite number any more (dt = {step.dt:.3g})"
         return Failure(message, self.node, step.cause(UNBOUNDED), step.remedy("the loads, law or fluid.flow"))
 
@@ -89,7 +89,7 @@ class OverStretched(NamedTuple):
     stretching: float
 
     def trouble(self, step: Step) -> Failure:
-        """What to say of it."""
+        """The failure, for the user."""
         message = f"a segment is {self.ratio:.3g} times its rest length (allowed {SHORTEST} to {LONGEST})"
         pull = f"about {abs(self.ratio - 1.0) * self.stretching:.3g}, more than its EA = {self.stretching:.3g} bears"
         cause = step.cause(f"the rod is pulled or pressed with {pull}")
@@ -104,7 +104,7 @@ class OverTwisted(NamedTuple):
     sine: float
 
     def trouble(self, step: Step) -> Failure:
-        """What to say of it."""
+        """The failure, for the user."""
         message = f"the twist between two nodes nears a quarter turn: sin = {self.sine:.3g} (allowed {LARGEST_TWIST})"
         cause = step.cause("the rod is wound up faster than it unwinds, until Eq. 39 stops resisting")
         return Failure(message, self.node, cause, step.remedy("more nodes, a slower spin, a larger twisting"))

@@ -1,4 +1,4 @@
-"""What a case has been assembled to: its rods, its fluid, its noise, its scheme."""
+"""A case assembled: its rods, its fluid, its noise, its scheme."""
 
 from __future__ import annotations
 

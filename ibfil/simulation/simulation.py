@@ -57,12 +57,12 @@ class Simulation:
 
     @property
     def system(self) -> RodSystem:
-        """What the rods answer: forces, stiffness."""
+        """The rods as a mechanical system: forces, stiffness."""
         return self.model.rods.system
 
     @property
     def fluid(self) -> Fluid:
-        """What the fluid answers."""
+        """The fluid."""
         return self.model.fluid
 
     @property
@@ -164,7 +164,7 @@ class Simulation:
         return 0.5 * dt >= time.min_step and not time.explicit and self.model.noise is None
 
     def longest_step(self) -> float:
-        """What the fluid's own motion leaves to steps that are not given; infinite for those that are."""
+        """The longest step that the fluid's own motion allows; infinite where the step is given."""
         time, longest = self.case.time, self.fluid.longest_step()
         if time.tolerance is not None or longest == np.inf:
             return longest
@@ -207,7 +207,7 @@ class Simulation:
         return np.repeat([f.twisting is not None for f in rods.filaments], [w.stop - w.start for w in rods.nodes])
 
     def _known(self, dt: float) -> failures.Step:
-        """What is known of a step that failed; the limit is that of the start, where the present is not finite."""
+        """The facts of a step that failed; the limit is that of the start, where the present is not finite."""
         limit = explicit_limit(self.system, self.fluid, self.start, 0.0) if self.case.time.explicit else np.inf
         return failures.Step(dt, limit, self.case.thermal is not None and self.case.thermal.energy > 0)
 

@@ -113,7 +113,7 @@ def _rates_of_end(end: End, horizon: float) -> Iterator[float]:
 
 
 def _force(model: Model, load, time: float) -> np.ndarray:
-    """What a load puts on the nodes of the start shape (n, 3)."""
+    """The force (n, 3) of a load on the nodes of the start shape."""
     force = np.zeros((len(model.rods.s), model.rods.system.unknowns))
     load.add_force(model.rods.start, time, force)
     return force[:, :3]

@@ -1,6 +1,6 @@
 """The members of a study: ordinary runs side by side, one HDF5 file each in one folder.
 
-What is done stays done, what was cut goes on from its checkpoint, what fails is told and takes no other run
+Finished runs are kept, cut ones go on from their checkpoint, failures are reported and take no other run
 with it. Everything above (sweep, compare, trade, stability, and scripts of users) makes a list of `Member` and
 reads the files of the `Outcome`s:
 
@@ -78,7 +78,7 @@ def run_members(
 
 
 def _line(outcome: Outcome) -> str:
-    """What is told of a member that has ended."""
+    """The line about a member that has ended."""
     spent = f" in {outcome.seconds:.1f} s" if outcome.seconds else ""
     return f"{outcome.member.name}: {outcome.status}{spent}" + (f": {outcome.message}" if outcome.message else "")
 

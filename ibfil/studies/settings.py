@@ -1,4 +1,4 @@
-"""What the studies have in common: the settings they vary, the numbers of a run, tables, and who measured them.
+"""The settings that studies vary: axes and their combinations.
 
 A study is a list of members (members.py), each a setting of one case. `sweep`, `compare`, `trade` and
 `stability` are made of it, and so are scripts of users:

@@ -112,7 +112,7 @@ _cut: list[int] = []  # the signals this process has had as a worker
 
 
 def _serve(pipe: Connection, work: Work, folder: str) -> None:
-    """What a worker does: members, until there are no more. It leaves the terminal's Ctrl-C to its parent."""
+    """The work of a worker: members, until there are no more. It leaves the terminal's Ctrl-C to its parent."""
     signal.signal(signal.SIGINT, lambda number, snapshot: _cut.append(number))
     os.setpgrp()
     set_threads(1)

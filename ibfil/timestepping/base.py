@@ -45,7 +45,7 @@ class Step(NamedTuple):
 
 
 class System(Protocol):
-    """What a stepper asks of the system."""
+    """The rods, as a stepper needs them."""
 
     length: float
 

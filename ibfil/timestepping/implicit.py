@@ -27,7 +27,7 @@ def _size(move, length):
 
 
 class _Equation(NamedTuple):
-    """What a step has to solve: y = target + tau (u0 + M (f(y) + R)), displacements y from ``start``."""
+    """The equation of a step: y = target + tau (u0 + M (f(y) + R)), displacements y from ``start``."""
 
     system: System
     response: Response

@@ -28,7 +28,7 @@ class Proposal(NamedTuple):
 
 
 class Verdict(Enum):
-    """What becomes of a step: it is taken, made again shorter, or made again shorter and without its past (Euler)."""
+    """The fate of a step: it is taken, made again shorter, or made again shorter and without its past (Euler)."""
 
     ACCEPTED, REJECTED, RESTARTED = range(3)
 
@@ -49,10 +49,10 @@ class StepControl(Protocol):
         """Whether a step of length dt from ``state`` is taken; where it is not, the next proposal is shorter."""
 
     def shorten(self, dt: float) -> Verdict:
-        """What is done about a step of length dt that could not be solved: the next proposal is half of it."""
+        """The verdict on a step of length dt that could not be solved: the next proposal is half of it."""
 
     def state(self) -> dict[str, Any]:
-        """What the control knows, by name: part of a run's state."""
+        """The state of the control, by name: part of a run's state."""
 
     def restore(self, state: dict[str, Any]) -> None:
         """Goes on from what ``state`` gave."""

@@ -1,4 +1,4 @@
-"""What is written on a picture: title, time, a scale bar, colour bars. By Pillow, in bands above and below the view."""
+"""The annotations of a picture: title, time, a scale bar, colour bars. By Pillow, in bands above and below the view."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TOP, FOOT = 0.07, 0.13  # heights of the bands, of the picture's
 
 
 class Words(NamedTuple):
-    """What does not change from one picture of a film to the next."""
+    """The annotations that do not change from one picture of a film to the next."""
 
     title: str
     bars: tuple[Scale, ...]

@@ -165,7 +165,7 @@ class _Pictures:
 
 
 def _of_thickness(run: Run) -> str:
-    """What is said of rods that have no thickness to show: no radius in the case, and no grid that gives them one."""
+    """The note on rods that have no thickness to show: no radius in the case, and no grid that gives them one."""
     bare = not run.case.fluid.on_grid and any(run.filament(name).radius is None for name in run.filaments)
     return "no radius given: drawn L/100 thick" if bare else ""
 

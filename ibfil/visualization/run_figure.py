@@ -193,7 +193,7 @@ def wrapped(r: np.ndarray, origin: np.ndarray, box: np.ndarray) -> np.ndarray:
 
 
 def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
-    """What is drawn against time: title, units, and label -> values; a line for each component."""
+    """A panel against time: title, units, and label -> values; a line for each component."""
     series = []
     for name, column in list(run.observables.items())[:SERIES]:
         values = np.asarray(column)

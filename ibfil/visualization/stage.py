@@ -39,7 +39,7 @@ class Scale(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """What the camera sees: half its height, its width over its height, and the unit vector to the right."""
+    """The view of the camera: half its height, its width over its height, and the unit vector to the right."""
 
     look: Viewpoint
     half: float

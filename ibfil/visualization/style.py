@@ -1,4 +1,4 @@
-"""What all figures have in common: style, colours and marks, labels with units, the plane that is drawn, files."""
+"""The common style of figures: style, colours and marks, labels with units, the plane that is drawn, files."""
 
 from __future__ import annotations
 

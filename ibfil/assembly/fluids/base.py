@@ -1,7 +1,7 @@
 """A model of the fluid, as a case names it: what makes the fluid, and all that is told of it.
 
-One class a model, listed in models.py. What checks, budgets, warnings and pictures want to know of a fluid they ask its
-model; none of them compares a word of the case.
+One class a model, listed in models.py. Checks, budgets, warnings and pictures ask the model about its fluid;
+none of them compares a word of the case.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Term(NamedTuple):
 
 
 class Scene(Protocol):
-    """What the warnings of a fluid ask of a simulation: where its rods begin, and what they do then."""
+    """The part of a simulation that the warnings of a fluid need: rods and their present state."""
 
     @property
     def rods(self) -> RodStack:
@@ -50,7 +50,7 @@ class Scene(Protocol):
         """The range of nodes of a filament, or of its first copy."""
 
     def snapshot(self) -> Snapshot:
-        """What an output would hold."""
+        """The snapshot of the present state."""
 
 
 class FluidModel(ABC):
@@ -67,7 +67,7 @@ class FluidModel(ABC):
 
     @abstractmethod
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
-        """What is written of it besides the motion of the rods."""
+        """Its outputs besides the motion of the rods."""
 
     @cached_property
     def grid(self) -> Grid | None:
@@ -110,18 +110,18 @@ class FluidModel(ABC):
         """A drag per length across, for time scales."""
 
     def automatic_limit(self, longest: float) -> float:
-        """What an automatic step may be at most, given the ``longest`` that the fluid's own motion allows."""
+        """The longest automatic step, given the ``longest`` that the fluid's own motion allows."""
         return longest
 
     # -- what is told
 
     @abstractmethod
     def modelled(self) -> list[str]:
-        """What it models, a line each."""
+        """The effects it models, a line each."""
 
     @abstractmethod
     def absent(self) -> list[str]:
-        """What it leaves out, a line each."""
+        """The effects it leaves out, a line each."""
 
     inertia_absent = "inertia of rod and fluid"
 
@@ -144,11 +144,11 @@ class FluidModel(ABC):
         return {}
 
     def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
-        """What should make one look twice at a filament in this fluid, given its groups."""
+        """Warnings about a filament in this fluid, given its dimensionless groups."""
         return []
 
     def warnings(self, scene: Scene) -> list[str]:
-        """What should make one look twice at the whole scene."""
+        """Warnings about the whole scene."""
         return []
 
     # -- pictures and recorded runs
@@ -166,5 +166,5 @@ class FluidModel(ABC):
     flow_from_forces = False  # whether recorded forces alone tell the flow at any point
 
     def solve_for_flow(self) -> StokesSolve:
-        """What finds the velocity that recorded forces drive. Only where ``flow_from_forces``."""
+        """The solver for the velocity that recorded forces drive. Only where ``flow_from_forces``."""
         raise NotImplementedError(self.case.fluid.model)

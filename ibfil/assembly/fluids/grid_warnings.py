@@ -1,4 +1,4 @@
-"""What in a scene on a grid should make its user look twice: nodes, waves, spins, images, net forces, flows."""
+"""Warnings about a scene on a grid: nodes, waves, spins, images, net forces, flows."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ class NavierStokesModel(GridModel):
     # -- what a step costs
 
     def _flow_terms(self, rods: RodStack, seconds: float, used: Mapping[str, float]) -> list[Term]:
-        """What answers to the forces; history and advection apart."""
+        """The response to forces; history and advection apart."""
         past = min(seconds, costs.of_inertia(self.grid.cells.tolist(), self.components))
         held = used[_HISTORY] + used[_TRANSFORMS]
         rest = super()._flow_terms(rods, seconds - past, {"rest": sum(used.values()) - held})

@@ -1,4 +1,4 @@
-"""What the models of fluids on a periodic grid share."""
+"""The common part of the models of fluids on a periodic grid."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class GridModel(FluidModel):
         return self.fluid(rods, self.immersed(rods), self.method(rods))
 
     def immersed(self, rods: RodStack) -> Immersed:
-        """What every fluid on this grid is made of."""
+        """The ingredients of every fluid on this grid."""
         from ...fluids import immersed_boundary
 
         case, grid, eta = self.case, self.grid, self.case.fluid.viscosity
@@ -91,7 +91,7 @@ class GridModel(FluidModel):
         return self.method(rods) != "table"
 
     def solver(self, rods: RodStack, method: str) -> Solver:
-        """What evaluates velocities by FFT: of the whole grid, or where that is cheaper of the filaments' box."""
+        """The solver for velocities by FFT: of the whole grid, or where that is cheaper of the filaments' box."""
         eta, threads = self.case.fluid.viscosity, self.case.compute.threads
         if self.case.couples_torque:
             from ...fluids.torque_coupling import TorqueStokesSolve
@@ -120,7 +120,7 @@ class GridModel(FluidModel):
         return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
 
     def factor_cost(self, rods: RodStack) -> float:
-        """What factoring the rods' own systems costs, in velocity evaluations."""
+        """The cost of factoring the rods' own systems, in velocity evaluations."""
         evaluation = costs.evaluation(self.grid.cells.tolist(), self._sizes(rods), len(rods.s))
         return sum(costs.factored(where.stop - where.start, self.components) for where in rods.nodes) / evaluation
 

@@ -56,7 +56,7 @@ class ResistiveForceModel(FluidModel):
         return out
 
     def absent(self) -> list[str]:
-        """What a grid would add."""
+        """Hydrodynamic interaction, and all that a grid takes."""
         return ["hydrodynamic interaction; grid and FFT plans"]
 
     def groups(self, filament: Filament, rate: float) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What the commands of the studies share: the case and its folder, what is varied, tables on the screen."""
+"""The common arguments of the studies: the case and its folder, what is varied, tables on the screen."""
 
 from __future__ import annotations
 

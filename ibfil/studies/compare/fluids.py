@@ -35,5 +35,5 @@ def known_fluids() -> tuple[str, ...]:
 
 
 def fluid_overrides(name: str, case: Case) -> tuple[str, ...]:
-    """What turns a case into one with that fluid."""
+    """The overrides that turn a case into one with that fluid."""
     return _OTHERS[name](case) if name in _OTHERS else (f"fluid.model={name}",)

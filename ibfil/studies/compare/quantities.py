@@ -1,4 +1,4 @@
-"""What a run shows over whole periods, each number with its scatter between them: the rows of `ibfil compare`."""
+"""The quantities of a run over whole periods, each with its scatter between them: the rows of `ibfil compare`."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ on a grid with a slip of at least 0.01, which keeps rods from locking. The first
     wrong       nodes are more than 0.05 L away (rms)
     stable      none of these
 
-What is predicted, without a run: that an explicit step beyond 2/rho(M K) diverges, that nodes nearer than 0.8 h without
+Predictions, made without a run: that an explicit step beyond 2/rho(M K) diverges, that nodes nearer than 0.8 h without
 slip lock, and that omega dt beyond 0.3 is not accurate.
 """
 

@@ -3,7 +3,7 @@
 Time and space are refined apart from the case's own resolution, each twice: steps h, h/2, h/4 at the case's nodes,
 and nodes N, 2N - 1, 4N - 3 at the step h. With the distances d1 of the first two runs of each and d2 of the last two,
 the observed order is log2(d1/d2). Below 0.7 of the nominal one it is no order: the levels of what is varied are
-refined further, and where that does not help the measure is refused. What is left of the error in the finest level is
+refined further, and where that does not help the measure is refused. The rest of the error in the finest level is
 d2/(2^p - 1), p the observed order or the nominal one, whichever is less.
 
 The reference has the finest step; and the finest nodes where nodes are varied. Where they are not, it has the case's,
@@ -44,7 +44,7 @@ Run = Callable[[Sequence[Member], Path], list[Outcome]]
 
 @dataclass(frozen=True)
 class Proof:
-    """What one direction of refinement shows of one measure."""
+    """The proof of one measure in one direction of refinement."""
 
     direction: str  # time | space
     levels: tuple[str, ...]

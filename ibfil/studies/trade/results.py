@@ -1,4 +1,4 @@
-"""What a trade study measured."""
+"""The results of a trade study."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Trade:
-    """What was measured: the reference, every setting, and the front of each measure (indices, cheapest first)."""
+    """The whole result: the reference, every setting, and the front of each measure (indices, cheapest first)."""
 
     title: str
     reference: Reference
@@ -47,7 +47,7 @@ class Trade:
         return min(good, key=lambda one: one.cost, default=None)
 
     def error(self, one: Trial, measure: str) -> float:
-        """What a setting's error may be: as found, and the reference's own."""
+        """The bound of a setting's error: as found, plus the reference's own."""
         return one.errors[measure] + self.reference.estimate(measure)
 
     def uncertain(self, one: Trial, measure: str) -> bool:

@@ -163,7 +163,7 @@ def _rounds(
 def _trial(
     setting: Setting, where: Path, repeat: int, clock: str, reference: Reference, measures: Sequence[str]
 ) -> Trial:
-    """What the repeats of a setting show."""
+    """The trial of a setting, from its repeats."""
     from ...io.reader import RunFile
 
     status, message = "left out", ""
