@@ -67,7 +67,7 @@ def inertia(cells: int = 64, precision: str = "double", bar: float | None = 1.2)
     """One step of the swimmer at rho = 10, advection and rods included, against the 15 components it would transform.
 
     Forces and coasting velocities go through slabs (grid/slab_fft.py), so that fewer are transformed in full: nine.
-    What takes the time beside them is memory: a step reads five fields of the past and of forces and writes as many
+    The rest of the time goes to memory: a step reads five fields of the past and of forces and writes as many
     (fluids/history.py).
     """
     text = case_text(41, "navier-stokes", "auto", "implicit", 1e-2)

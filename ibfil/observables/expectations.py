@@ -43,7 +43,7 @@ class Check:
 def check(case: Case, summaries: Mapping[str, Summary]) -> list[Check]:
     """Hold every expectation of the case against the summaries of its run.
 
-    What is not one finite number, or covers only a part of its window, has not passed.
+    A value that is not one finite number, or covers only a part of its window, has not passed.
     """
     return [_check(name, expect, summaries[expect.observe]) for name, expect in case.expect.items()]
 
