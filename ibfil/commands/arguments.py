@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import os
 import sys
 from collections.abc import Sequence
@@ -116,6 +115,8 @@ def log(line: str) -> None:
 
 def say_if_cold() -> None:
     """Say so where numba has yet to compile: it keeps kernels beside their files, or under a hash of the path."""
+    import hashlib
+
     from platformdirs import user_cache_path
 
     package = Path(__file__).parents[1] / "rods"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,6 +61,8 @@ def _resume(arguments: argparse.Namespace) -> int:
 
 def _threads_of(run: str) -> int:
     """The threads of a run's case, read by another process; 1 where it cannot be read, to fail later."""
+    import subprocess
+
     code = (
         "import sys, pathlib; from ibfil.case.reading import parse_case; from ibfil.io import checkpoint, reader; "
         "c = checkpoint.read(reader.checkpoint_path(pathlib.Path(sys.argv[1]))); "
