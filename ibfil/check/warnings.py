@@ -52,7 +52,7 @@ def _of_held_ends(key: str, filament: Filament) -> list[str]:
 
 
 def _of_noise(simulation: Simulation) -> list[str]:
-    """Warnings about thermal forces: on the rods and on the step (derivations.md, section 5)."""
+    """Warnings about thermal forces: on the rods and on the step (timestepping/README.md)."""
     case = simulation.case
     out: list[str] = []
     if case.thermal is None or case.thermal.energy == 0:

@@ -14,7 +14,7 @@ Where twist torques go onto the grid (rotation = "grid") the rod is spun about i
 nodes at unit rate, ends and the rod's own radius included, are its drag against spin.
 
 RFT knows no interaction between parts of a rod but through these numbers: they are smaller for a longer rod, and the
-right length is one over which a rod moves as one, a wavelength (ib_numerics.md, section 7).
+right length is one over which a rod moves as one, a wavelength (fluids/README.md).
 """
 
 from __future__ import annotations

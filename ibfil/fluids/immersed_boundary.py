@@ -4,7 +4,7 @@
 
 S spreads nodal forces with a discrete delta kernel, L^-1 is the fluid's solve, J interpolates back (S transposed, times
 the cell's volume), s is the slip mobility that keeps nearly inextensible rods from locking when their nodes are closer
-than the grid (numerics.md, 4.3). A coupling says what of a node goes through the fluid: forces and velocities
+than the grid (fluids/README.md). A coupling says what of a node goes through the fluid: forces and velocities
 (mobility_table.py), or torques and spins with them (torque_coupling.py). Reactions of supports are spread like any
 force.
 """

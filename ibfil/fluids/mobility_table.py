@@ -1,4 +1,4 @@
-"""The exact mobility of nodes on the grid, without the grid (ib_numerics.md, section 1).
+"""The exact mobility of nodes on the grid, without the grid (fluids/README.md).
 
 Weights of a node are products over the axes, so the velocity that a unit force at node q gives node p is
 

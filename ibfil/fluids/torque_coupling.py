@@ -17,7 +17,7 @@ what the fluid between a and b slips,
 
 and one alone spins against 4 pi eta a^2, as in resistive-force theory.
 
-Torques of nodes less than some cells apart lock as forces do (numerics.md, 4.3): the grid hardly sees what changes sign
+Torques of nodes less than some cells apart lock as forces do (fluids/README.md): the grid hardly sees what changes sign
 from node to node, and a prescribed spin is then answered by torques that do, twenty times too large. So c is at least
 eps/(4 pi eta b^2 Lc) with the eps of the slip: a rod spins as one of radius b/sqrt(1 + eps) at most.
 

@@ -2,7 +2,7 @@
 
 A kernel of P points gives weights phi(x_k) at the grid points nearest to a node; the weights of the three axes
 multiply. The physical radii of each kernel were measured with the Fourier Stokes operator of this package, and
-tests/test_kernels.py measures it again. In units of the grid spacing h, to a part in 1000:
+tests/grid/test_kernels.py measures them again. In units of the grid spacing h, to a part in 1000:
 
 point radius   of the sphere that moves like one node. The mean of the self mobility over 512 places of the node
                in a cell is U/F = (1 - 2.837297 a/L + 4.18879 (a/L)^3 - 27.4 (a/L)^6)/(6 pi eta a) in a periodic

@@ -15,7 +15,7 @@ def weights(x: np.ndarray, at: float, order: int) -> np.ndarray:
 
 
 def clamped_weights(x: np.ndarray) -> tuple[np.ndarray, float]:
-    """Weights of r'' at ``x[0]``: on three nodes, and on the slope there. Exact for cubics (derivations.md, 2).
+    """Weights of r'' at ``x[0]``: on three nodes, and on the slope there. Exact for cubics (rods/README.md).
 
     Even spacing: (-7 r1 + 8 r2 - r3 - 6 ds T)/(2 ds^2).
     """

@@ -161,7 +161,7 @@ class ActiveMoment(ExternalLoad):
 
 
 class EndMoment(ExternalLoad):
-    """A moment m(t) on the end of a rod that is free to turn: M(L) = +m, M(0) = -m (derivations.md, section 2).
+    """A moment m(t) on the end of a rod that is free to turn: M(L) = +m, M(0) = -m (rods/README.md).
 
     ``parts(t)`` (3,) in the lab, or along e1, e2, e3 where ``body``. The moment at the end node gives the flux beside
     it Q = e3 x M and P = M1 O1 + M2 O2, and the node the torque m.e3 and its source. Rods that are ``torque_free`` have

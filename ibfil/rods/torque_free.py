@@ -1,7 +1,7 @@
 """The variant of Eq. 44 whose nodal forces and twist torques have no net torque, at any spacing, to round-off.
 
-Eq. 44 conserves force exactly and torque only to O(strain) where the rod is unevenly stretched. Here (derivations.md,
-section 3) the tangent is the bisector of the neighbouring segments, and the fluxes hold the true distances:
+Eq. 44 conserves force exactly and torque only to O(strain) where the rod is unevenly stretched. Here (rods/README.md)
+the tangent is the bisector of the neighbouring segments, and the fluxes hold the true distances:
 
     u = d/|d|,  s_i = (u_{i-1/2} + u_{i+1/2})/(1 + u_{i-1/2}.u_{i+1/2}),  s_1 = u_{3/2}, s_N = u_{N-1/2},  e3 = s/|s|
     F_{i+1/2} = [Q_{i+1} - Q_i + M3_{i+1/2} u x (s_{i+1} - s_i)]/|d| + F'3 d/ds,     Q = M1 e2 - M2 e1

@@ -14,7 +14,7 @@ with W1_ii the weight of a node in its own tangent, and d = 3, or 2 in a plane. 
 spacing is uneven; without it a free rod is under a compression of 1.5 kT/ds, the more the finer it is.
 
 Of a mode of rate lam, backward Euler leaves kT/k/(1 + lam dt/2), and BDF2 less; the trapezoid kT/k at every dt. Its
-price: it forgets the stiffest modes in lam dt/4 steps (derivations.md, section 5).
+price: it forgets the stiffest modes in lam dt/4 steps (timestepping/README.md).
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .results import Runs
 
 ANGLES = (20, 30, 45, 60, 75)
-ELASTIC = {20: 1.161, 30: 1.002, 45: 0.779, 60: 0.620, 75: 0.529}  # numerics.md, section 6: N = 300, 1 ms
+ELASTIC = {20: 1.161, 30: 1.002, 45: 0.779, 60: 0.620, 75: 0.529}  # independent code: N = 300, 1 ms
 LAG = 1e-3
 
 
@@ -78,7 +78,7 @@ def _row(name: str, angle: float, found: np.ndarray, theory: float, seconds: flo
     if name == "ring":
         note += "; rigid 4/3: in 1 ms it does not yield to all kicks"
     elif name != "rod":
-        note += f"; numerics.md at N = 300: {ELASTIC[round(angle)]}; Eq. 57 leaves out that it turns as it slides"
+        note += f"; independent code at N = 300: {ELASTIC[round(angle)]}; Eq. 57 leaves out that it turns as it slides"
     return Row(
         "7.4",
         f"D_perp/D_par, {name}, mean of {len(found)}",

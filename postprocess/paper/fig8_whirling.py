@@ -29,7 +29,7 @@ THEORY = {
     (0.05, 0.05): (8.936, None),
     (0.05, 0.02): (8.875, None),
 }
-SPINS = (0.985, 0.995, 1.005, 1.015)  # about the rounded values below, which the paper's 8.9 and numerics.md suggest
+SPINS = (0.985, 0.995, 1.005, 1.015)  # about the rounded values below, which the paper's 8.9 and THEORY suggest
 ABOUT = {(1.0, 0.1): 8.9, (0.5, 0.1): 8.9, (0.05, 0.1): 9.2, (0.05, 0.05): 8.9, (0.05, 0.02): 8.9}
 CLAMP = "/(4*pi*eta*a**2)"
 UP, DOWN = "8.6 + 0.005*t", "where(t < 60, 10, 9.4 - 0.005*max(t - 80, 0))"

@@ -123,7 +123,7 @@ def neutral(mu: float) -> float:
 
 
 def test_a_straight_rod_at_a_stagnation_point_buckles_at_the_known_strength() -> None:
-    """zeta_perp gamma L^4/A = 153.2 (numerics.md, 6). Below it only tilt grows, at 2 gamma, and drift, at gamma."""
+    """zeta_perp gamma L^4/A = 153.2 (linear stability). Below it only tilt grows, at 2 gamma, and drift, at gamma."""
     critical = brentq(neutral, 120.0, 180.0, xtol=1e-10)
     assert critical == pytest.approx(153.2, abs=0.01)
     errors = []

@@ -43,7 +43,7 @@ def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     [(1.0, 64, 5.70, 3.87), (0.5, 64, 7.13, 5.37), (0.5, 128, 5.05, 3.56), (1.0, 128, 4.25, 2.74)],
 )
 def test_known_numbers(length, cells, perp, par):
-    """ib_numerics.md, section 7: independent code, rods in random directions, nodes a cell apart, to three digits."""
+    """Independent code: rods in random directions, nodes a cell apart, to three digits."""
     nodes = round(length * cells / 3.2) + 1
     found = measure(Rod(length, nodes, (3.2,) * 3, (cells,) * 3, "peskin4", 0.0))
     assert found.perp == pytest.approx(perp, rel=5e-3)
@@ -53,7 +53,7 @@ def test_known_numbers(length, cells, perp, par):
 
 
 def test_one_rod_on_a_grid_line_of_the_known_drag():
-    """numerics.md, section 6."""
+    """Independent code, to seven digits."""
     grid, kernel = Grid([3.2] * 3, [64] * 3), KERNELS["peskin4"]
     table = mobility_table.octant(mobility_table.point_response(grid, 1.0), kernel.points)
     line = np.linspace(-0.5, 0.5, 21)[:, None] * np.array([1.0, 0, 0])

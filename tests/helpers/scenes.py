@@ -20,7 +20,7 @@ from ibfil.rods.mesh import Segmented, stack
 from ibfil.rods.system import RodSystem
 from ibfil.simulation.simulation import Simulation
 
-# A grid small enough for tests: nodes further apart than cells, so nothing locks (numerics.md, 4.3).
+# A grid small enough for tests: nodes further apart than cells, so nothing locks (fluids/README.md).
 STOKES: Mapping[str, Any] = {"model": "stokes", "box": [2.0, 2.0, 2.0], "cells": [32, 32, 32], "slip": 0.01}
 RFT: Mapping[str, Any] = {"model": "rft"}
 # Every unknown at work: bent and twisted in space by strains of its own, and spun at a clamp.

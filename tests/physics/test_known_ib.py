@@ -1,8 +1,7 @@
 """Rods in an immersed-boundary Stokes fluid: orders in time, published swimming speeds, locking, and symmetries.
 
-Speeds are means over the second and third period in lengths L per time eta L^4/A (numerics.md, section 6). They were
-found by independent code with the paper's Eq. 11; the package takes e3 x M exactly, which moves them by up to 0.5 %
-where a rod is not locked.
+Speeds are means over the second and third period in lengths L per time eta L^4/A. They were found by independent code
+with the paper's Eq. 11; the package takes e3 x M exactly, which moves them by up to 0.5 % where a rod is not locked.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Known answers under resistive-force theory (numerics.md, section 6): rates, thresholds, speeds.
+"""Known answers under resistive-force theory, derived or found by independent code: rates, thresholds, speeds.
 
 Rates are eigenvalues of the linearised statement, in units of A/(zeta_perp L^4): no time step stands between the
 scheme and the answer. Each is extrapolated from three grids, N, 2 N - 1, 4 N - 3, and held against the published

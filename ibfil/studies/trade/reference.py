@@ -9,7 +9,7 @@ d2/(2^p - 1), p the observed order or the nominal one, whichever is less.
 The reference has the finest step; and the finest nodes where nodes are varied. Where they are not, it has the case's,
 and what the refinement shows is what the nodes themselves cost: `Reference.of_nodes`.
 
-The grid is no level: its cells are the thickness of the rod (numerics.md, section 4). With little slip the force
+The grid is no level: its cells are the thickness of the rod (fluids/README.md). With little slip the force
 density has thin layers at the ends, and second order in nodes shows only where they are well below h apart.
 """
 
