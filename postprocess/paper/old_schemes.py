@@ -1,6 +1,6 @@
 """What the two schemes that ibfil does not have share: the swimmer of Sec. 7.1, its drag, its tension, its stencils.
 
-Nodes (n, 3) in the plane z = 0, e1 = z, A = 1. Band matrices by node as in ibfil/banded.py: (n, 3, (2 w + 1) 3).
+Nodes (n, 3) in the plane z = 0, e1 = z, A = 1. Band matrices by node as in ibfil/linalg/banded.py: (n, 3, (2 w + 1) 3).
 """
 
 from __future__ import annotations

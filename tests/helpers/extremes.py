@@ -2,9 +2,9 @@
 
 Each cell of the map is one run over a period, judged against one with a four times finer step: it survives where it
 is finite, Newton converged, each segment's stretch is within two percentage points of the finer run's, and the RMS
-position within 5 % of L, at three times in the period. ``python tests/extremes.py`` prints the map and the numbers of
-all cells, ``python tests/extremes.py stokes`` those of one fluid. Lengths are in units of L, A1 = 1, omega = 10 is
-the rate of the wave of preferred curvature, or of the clamp's spin.
+position within 5 % of L, at three times in the period. ``PYTHONPATH=.:tests python -m helpers.extremes`` prints the map
+and the numbers of all cells; with ``stokes`` at its end those of one fluid. Lengths are in units of L, A1 = 1,
+omega = 10 is the rate of the wave of preferred curvature, or of the clamp's spin.
 
     .  survives, every step solved at once
     h  survives, some steps were halved on the way (Newton's iteration failed)

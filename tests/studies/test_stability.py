@@ -53,7 +53,7 @@ def test_a_class_is_the_first_number_beyond_its_limit(numbers, kind):
 
 
 def test_the_limits_are_those_of_the_extremes():
-    """One meaning of `accurate` in the package: tests/extremes.py judges by the same numbers."""
+    """One meaning of `accurate` in the package: tests/helpers/extremes.py judges by the same numbers."""
     assert (stability_study.PLACE, stability_study.STRETCH) == (PLACE, STRETCH)
 
 
