@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import CaseError
 from .consistency import check
+from .deprecated import modernise
 from .expressions import (
     CONSTANTS,
     FUNCTIONS,
@@ -56,12 +57,13 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
     except ValueError as error:
         raise CaseError([f"{name}: not TOML: {error}"]) from None
     raw, faults = _overridden(raw, [split(override) for override in overrides])
+    deprecated = modernise(raw)
     scene, more = _read(raw)
     faults += more
     faults += _quick_faults(raw, more)
     if faults or scene is None:
         raise CaseError(list(dict.fromkeys(fault.line(name) for fault in faults)))
-    return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name)
+    return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name, deprecated=tuple(deprecated))
 
 
 def quick_case(case: Case, name: str) -> Case:
@@ -72,7 +74,7 @@ def quick_case(case: Case, name: str) -> Case:
 
 def differences(a: Case, b: Case) -> dict[str, tuple[Any, Any]]:
     """The keys, as dotted paths, whose values differ, with both; ``text`` and ``file`` are not compared."""
-    return {key: (one, other) for key, one, other in _differing(a, b, ()) if key not in ("text", "file")}
+    return {key: (one, other) for key, one, other in _differing(a, b, ()) if key not in ("text", "file", "deprecated")}
 
 
 def written(value: Any) -> str:

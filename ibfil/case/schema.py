@@ -214,7 +214,11 @@ class Scene(Table):
 
 
 class Case(Scene):
-    """A checked case. ``text`` is its resolved TOML, overrides included; ``file`` the name it goes by."""
+    """A checked case. ``text`` is its resolved TOML, overrides included; ``file`` the name it goes by.
+
+    ``deprecated`` holds a line for each word of an older version that was read as another.
+    """
 
     text: str
     file: str
+    deprecated: tuple[str, ...] = ()

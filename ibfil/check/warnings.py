@@ -25,7 +25,7 @@ THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wr
 
 def warnings(simulation: Simulation) -> list[str]:
     """One sentence for each thing that runs but may not mean what its user thinks."""
-    case, fluid, out = simulation.case, simulation.model.fluid_model, []
+    case, fluid, out = simulation.case, simulation.model.fluid_model, list(simulation.case.deprecated)
     for name, filament in case.filaments.items():
         key, found = f"filament.{name}", of_filament(simulation, filament)
         out += fluid.warnings_of(simulation, name, found)

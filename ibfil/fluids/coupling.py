@@ -72,7 +72,7 @@ class Nodes:
 
 
 class Translation:
-    """Forces move nodes (immersed.Coupling): three numbers a node go through the grid, all of them vectors."""
+    """Forces move nodes (`Coupling`): three numbers a node go through the grid, all of them vectors."""
 
     components, grid_vectors = 3, 1
 

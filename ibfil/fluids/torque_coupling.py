@@ -197,7 +197,7 @@ def spin_mobility(radius: np.ndarray, widest: float, slip: float, viscosity: flo
 
 
 class TorqueCoupling:
-    """Torques and spins go through the grid with forces and velocities (immersed.Coupling): four numbers a node.
+    """Torques and spins go through the grid with forces and velocities (coupling.Coupling): four numbers a node.
 
     ``spin`` (n,) is what a node spins per torque beyond the grid's answer, ``twists`` (n,) is one where the rod twists
     and zero where it does not: there a torque acts on the node's own spin only, and stirs nothing.

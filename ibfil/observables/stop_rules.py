@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class StopRules:
-    """The stop rules of a case, looked at once for each output in the order of time (as `Observers.take`)."""
+    """The stop rules of a case, looked at once for each output in the order of time (as `ObservableSet.record`)."""
 
     def __init__(self, case: Case, observers: ObservableSet) -> None:
         self._rules, self._observers = case.stops, observers

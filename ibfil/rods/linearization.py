@@ -1,7 +1,7 @@
 """How forces that follow the rod change with it: from tangents, curvatures and turns into a band matrix by node.
 
 A load writes its derivative in the quantities it is made of; here they are traced to displacements. With the tangents
-``old`` of the step's start (holonomy as in ``elasticity.stiffness``):
+``old`` of the step's start (holonomy as in elastic_jacobian.py):
 
     de3 = (1 - e3 e3) dr'/|r'|,   dpsi = dphi + (e3 x old).de3/(1 + old.e3)
     de1 = -(e1.de3) e3 + e2 dpsi,   de2 = -(e2.de3) e3 - e1 dpsi

@@ -117,7 +117,7 @@ class RodSystem:
     def _stiffness(
         self, configuration: Configuration, start: Configuration, moment: Moment, time: float, least: float
     ) -> np.ndarray:
-        """The Jacobian with tensions not below ``least`` (elasticity.stiffness)."""
+        """The Jacobian with tensions not below ``least`` (elastic_jacobian.py)."""
         matrix = np.zeros(self._matrix_shape)
         elastic_jacobian.stiffness(
             self.mesh, self._stencils, configuration, start, moment, self.stretching, least, matrix

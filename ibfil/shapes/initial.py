@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 def initial_shape(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:
     """Positions r (N, 3), in the case's length, and unit directors e1 (N, 3) at t = 0, in the lab frame.
 
-    The shape's own curve and frame are placed (``shape_placing.place``), then e1 is turned about e3 by the
+    The shape's own curve and frame are placed (placing.py), then e1 is turned about e3 by the
     integral of ``twist`` from s = 0, then ``perturb`` and ``noise`` are added to r. e1 is normal to the
     tangent of the placed curve; the tangents of stencils, on perturbed nodes, differ, so who has them
-    calls ``shape_curves.perpendicular``. A curve bent by kappa1 alone has e1 = ``normal``, with the same bits
+    calls ``curves.perpendicular``. A curve bent by kappa1 alone has e1 = ``normal``, with the same bits
     at every node.
 
     Kinds, in their own frame (O1, O2, O3):
@@ -40,7 +40,7 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
     * circle: (curvature, 0, 0), an arc of at most one turn that bends to the left seen from the tip of e1.
     * expression: nodes at r(s), also where |dr/ds| is not 1: the rod then starts stretched
       (``stretch_warning``); e1 without twist.
-    * file: points in the file (``shape_points.curve_from_points``), relative to ``folder``.
+    * file: points in the file (points.py), relative to ``folder``.
     * run: as the filament of the same name, which ``key`` ends with, stood in a run (``shape_from_run``), relative to
       ``folder``; it is not placed again.
 

@@ -1,7 +1,7 @@
 """How fast things happen in a scene: what drives it, relaxation times, and the automatic step.
 
 How fast a scene is driven, in radians per time, is what the automatic step and the dimensionless groups rest on:
-`cycles` of what is prescribed to change in time, `pushes` of what has no period.
+`forcing_rates` of what is prescribed to change in time, `load_rates` of what has no period.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def stretch_by_kicks(model: Model, dt: float) -> float:
 
 
 def implicit_step(forcing_rates: list[float], load_rates: list[float], slowest: float) -> float:
-    """1/25 of the shortest period of what drives the rods, by the rates (radians per time) of `cycles` and `pushes`.
+    """1/25 of the shortest period of what drives the rods, by the rates (radians per time) of `forcing_rates` and `load_rates`.
 
     Where nothing changes in time, no longer than 1/25 of the slowest bending time either: the rods go to rest in that.
     """

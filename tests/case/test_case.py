@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from helpers.example_cases import BROWNIAN_HELIX, EXAMPLES, FLAILING, HELIX_IN_FLOW, SHORT, SWIMMER, WHIRLING, case, rod
+from helpers.made_run import BENT
 
 from ibfil.case.expressions import parse
 from ibfil.case.fluid import Coefficients, Matched
@@ -253,3 +254,13 @@ def test_reading_a_case_imports_no_numpy(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "pydantic" in done.stdout.split()
     assert not {"numpy", "numexpr", "scipy", "numba", "h5py"} & set(done.stdout.split())
+
+
+def test_a_word_of_an_older_version_is_read_as_the_one_that_stands_for_it_and_that_is_told():
+    text = BENT.replace('model = "rft"', 'model = "stokes"\nmethod = "averaged"\nbox = [2, 2, 2]\ncells = [16, 16, 16]')
+    old = parse_case(text, "old.toml")
+    assert old.fluid.method == "table"
+    (line,) = old.deprecated
+    assert line.startswith('fluid.method: "averaged" is gone')
+    assert 'method = "table"' in old.text
+    assert parse_case(BENT, "new.toml").deprecated == ()

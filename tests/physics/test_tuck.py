@@ -26,7 +26,7 @@ from ibfil.grid.periodic_grid import Grid
 from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation.simulation import Simulation
 
-CASE = Path(__file__).parents[1] / "cases/inertia/pumping_sheets.toml"
+CASE = Path(__file__).parents[2] / "cases/inertia/pumping_sheets.toml"
 TALL, AMPLITUDE = 2, 0.05  # H in wavelengths, k b
 
 

@@ -179,9 +179,9 @@ from ibfil.io import writer as recorder
 from ibfil.running import loop, run as running
 loop._LOOK = recorder._PAUSE = recorder._SHARE = 0
 class Paced(FakeSimulation):
-    def frame(self, *fields):
+    def snapshot(self, *fields):
         sys.stdin.readline()
-        return super().frame(*fields)
+        return super().snapshot(*fields)
 build = lambda *given: Paced(*given, pause=0.001)
 running.run(case("", "output.checkpoint_every=1000"), sys.argv[1], build=build, look=look, progress=False, log=id)
 """
