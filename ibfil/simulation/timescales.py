@@ -156,7 +156,7 @@ def stretch_by_kicks(model: Model, dt: float) -> float:
 
 
 def implicit_step(forcing_rates: list[float], load_rates: list[float], slowest: float) -> float:
-    """1/25 of the shortest period of what drives the rods, by the rates (radians per time) of `forcing_rates` and `load_rates`.
+    """1/25 of the shortest period that drives the rods, by `forcing_rates` and `load_rates` (radians per time).
 
     Where nothing changes in time, no longer than 1/25 of the slowest bending time either: the rods go to rest in that.
     """
