@@ -133,7 +133,6 @@ def test_no_files_import_each_other_in_a_round():
 LONG_FILES = {  # lines today; the list only shrinks
     "case/consistency.py": 311,
     "case/expressions.py": 390,
-    "case/reading.py": 303,
     "io/reader.py": 361,
     "io/writer.py": 373,
     "observables/local.py": 387,

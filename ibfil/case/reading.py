@@ -26,7 +26,6 @@ from .expressions import (
     parse,
 )
 from .faults import Fault, Found, dotted, example, found_by_pydantic, shown
-from .fluid import Coefficients, Matched
 from .overrides import apply, load, split
 from .schema import Case, Scene
 from .values import keys
@@ -87,35 +86,6 @@ def written(value: Any) -> str:
     if isinstance(value, tuple):
         return "[" + ", ".join(map(written, value)) + "]"
     return "nothing" if value is None else shown(value)
-
-
-def idle_keys(case: Case) -> list[str]:
-    """The keys of the file that do nothing under its fluid and start shapes, and the parameters that nothing uses."""
-    raw = load(case.text)
-    fluid = case.fluid
-    idle: dict[str, list[str]] = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
-    if fluid.model == "rft":
-        grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "kernel", "slip"]
-        idle["fluid"] += [*grid, "method", "precision"]
-        spins = isinstance(fluid.drag, Matched) and fluid.rotation == "grid"
-        idle["fluid"] += [] if spins and any(f.twisting for f in case.filaments.values()) else ["rotation"]
-        idle["output"] += ["grid_every", "fields", "grid_stride", "probes"]
-    else:
-        turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())
-        spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None
-        idle["fluid"] += [] if turns and spin else ["drag"]
-    placing = ["position", "anchor", "direction", "align", "normal"]
-    idle |= {f"filament.{name}": placing for name, f in case.filaments.items() if f.shape.kind == "run"}
-    written = [f"{table}.{key}" for table, names in idle.items() for key in names if key in _table(raw, table)]
-    used = set(re.findall(r"[A-Za-z_]\w*", " ".join(_texts(raw))))
-    return written + [f"parameters.{key}" for key in raw.get("parameters", {}) if key not in used]
-
-
-def _table(raw: dict[str, Any], path: str) -> dict[str, Any]:
-    """The table of that path; empty where the file has none."""
-    for part in path.split("."):
-        raw = raw.get(part, {})
-    return raw
 
 
 def _overridden(
@@ -289,16 +259,3 @@ def _differing(a: Any, b: Any, path: tuple[str | int, ...]) -> Iterator[tuple[st
             yield from _differing(one, other, (*path, i))
     elif a != b:
         yield dotted(path), a, b
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """The texts in the file's content in which a parameter may stand."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, list):
-        for item in value:
-            yield from _texts(item)
-    elif isinstance(value, dict):
-        for key, item in value.items():
-            if key not in ("title", "source", "units", "path", "file"):
-                yield from _texts(item)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..assembly.fluids.models import fluid_model
 from ..assembly.loads import ALONG, ON_ENDS, named
-from ..case.reading import idle_keys
+from ..case.idle import idle_keys
 from ..simulation.simulation import Simulation
 from .budget import disk, memory, shares, terms
 from .dimensionless import groups

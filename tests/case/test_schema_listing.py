@@ -7,8 +7,8 @@ import json
 import pytest
 from helpers.example_cases import SHORT, case
 
+from ibfil.case.idle import idle_keys
 from ibfil.case.listing import schema_json, schema_text
-from ibfil.case.reading import idle_keys
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from helpers.scenes import scene
 
 from ibfil.assembly import drag as assembly_drag
 from ibfil.assembly import rods as assembly_rods
-from ibfil.case.reading import idle_keys
+from ibfil.case.idle import idle_keys
 from ibfil.check.dimensionless import groups
 from ibfil.check.report import report
 from ibfil.check.warnings import warnings

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ibfil
-from ibfil.case.reading import idle_keys
+from ibfil.case.idle import idle_keys
 from ibfil.errors import CaseError, Interrupted
 from ibfil.simulation.simulation import Simulation
 
