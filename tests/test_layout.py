@@ -131,7 +131,7 @@ def test_no_files_import_each_other_in_a_round():
 
 
 LONG_FILES = {  # lines today; the list only shrinks
-    "case/consistency.py": 311,
+    "case/consistency/scene.py": 311,
     "case/expressions.py": 390,
     "io/reader.py": 361,
     "io/writer.py": 373,

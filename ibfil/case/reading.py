@@ -13,7 +13,7 @@ import tomli_w
 from pydantic import BaseModel, ValidationError
 
 from ..errors import CaseError
-from .consistency import check
+from .consistency.scene import check
 from .deprecated import modernise
 from .expressions import (
     CONSTANTS,

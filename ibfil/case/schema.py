@@ -1,7 +1,7 @@
 """Every table and key of a case file, as frozen descriptions: each key with its default and its meaning.
 
 The tables of a filament are in filament.py and shape.py, kinds of value in values.py, checks between keys in
-consistency.py. Some defaults depend on other tables: reading.py fills those in
+consistency/. Some defaults depend on other tables: reading.py fills those in
 before it reads, and the text here says so.
 """
 

@@ -36,7 +36,7 @@ class OfFilament(ObservableBase):
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)
         filament = single(case.filaments, self.filament)
-        assert filament is not None  # case/consistency.py
+        assert filament is not None  # case/consistency/scene.py
         self.model = filament
         self.length, self.s = filament.length, node_arclength(filament)
         self.share = trapezoid_weights(self.s) / self.length  # (N,) of each node in the filament

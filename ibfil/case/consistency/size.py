@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from .faults import Fault, shown
-from .fluid import Matched
-from .schema import Scene
+from ..faults import Fault, shown
+from ..fluid import Matched
+from ..schema import Scene
 
 # At least so much is needed, whatever the method: what is let through may still be too much, and `check` estimates it.
 BYTES_A_CELL = 24  # one vector field

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from .consistency_planar import check_planar
-from .expressions import Expression, ExpressionError
-from .faults import Fault, shown
-from .filament import End, Filament, TwoWell, copy_name, single
-from .schema import Scene
-from .shape import Circle, Helix, RunShape
+from ..expressions import Expression, ExpressionError
+from ..faults import Fault, shown
+from ..filament import End, Filament, TwoWell, copy_name, single
+from ..schema import Scene
+from ..shape import Circle, Helix, RunShape
+from .planar import check_planar
 
 Axis = tuple[float, float, float]
 

@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise
 
-from .consistency_filament import check_filament
-from .consistency_size import check_size
-from .expressions import ExpressionError, suggestion
-from .faults import Fault, shown
-from .filament import copy_name, single
-from .fluid import Coefficients, Fluid, Matched
-from .schema import Observe, Scene
+from ..expressions import ExpressionError, suggestion
+from ..faults import Fault, shown
+from ..filament import copy_name, single
+from ..fluid import Coefficients, Fluid, Matched
+from ..schema import Observe, Scene
+from .filament import check_filament
+from .size import check_size
 
 SUPPORT = {"roma3": 3, "peskin4": 4, "bspline4": 4, "bspline6": 6, "bkp6": 6, "es4": 4, "es5": 5, "es6": 6}
 LONGEST = 500  # segments of the straight rod that drag is matched to: more would be a long wait

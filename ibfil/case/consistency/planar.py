@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from .expressions import Expression, ExpressionError
-from .faults import Fault
-from .filament import End, Filament, Loads
-from .fluid import Fluid
-from .schema import Scene
-from .shape import Circle, Helix
+from ..expressions import Expression, ExpressionError
+from ..faults import Fault
+from ..filament import End, Filament, Loads
+from ..fluid import Fluid
+from ..schema import Scene
+from ..shape import Circle, Helix
 
 Vector = tuple[float, float, float]
 Components = Sequence[Expression] | Sequence[float]
