@@ -1,6 +1,7 @@
 """The ways in which a run fails: what was found, the limit, the likely cause, the key to change. Each in one place.
 
-The README lists these with what `ibfil check` warns of (check/warnings.py) and refusals of cases (case/consistency/scene.py).
+The README lists these with what `ibfil check` warns of (check/warnings.py) and refusals of cases
+(case/consistency/scene.py).
 """
 
 from __future__ import annotations
