@@ -48,12 +48,12 @@ def matching(case: Case, filament: Filament) -> Match | None:
         return None
     from ..fluids import calibrated_drag
 
-    box, cells = case.fluid.box, case.fluid.cells or grid.cells_of_thickness(case)
-    assert box is not None
     nodes, radius = 1 + round(drag.matched * (filament.nodes - 1) / filament.length), 0.0
     if case.fluid.rotation == "grid" and filament.twisting is not None and filament.radius is not None:
         radius = float(np.mean(alone(filament.radius, np.linspace(0.0, filament.length, filament.nodes))))
-    rod = calibrated_drag.Rod(drag.matched, nodes, box, cells, case.fluid.kernel, case.fluid.slip, radius)
+    rod = calibrated_drag.Rod(
+        drag.matched, nodes, grid.periodic_space(case), case.fluid.kernel, case.fluid.slip, radius
+    )
     try:
         return calibrated_drag.match(rod)
     except ValueError as error:

@@ -12,8 +12,8 @@ from .profiles import alone
 if TYPE_CHECKING:
     from ..case.schema import Case
     from ..fluids.coupling import Coupling
+    from ..fluids.spaces.periodic import PeriodicSpace
     from ..grid.kernels import Kernel
-    from ..grid.periodic_grid import Grid
     from .stacked import RodStack
 
 
@@ -51,12 +51,12 @@ def cells(case: Case) -> tuple[int, int, int]:
     return case.fluid.cells or cells_of_thickness(case)
 
 
-def grid(case: Case) -> Grid:
-    """The case's grid. Raises CaseError where ``thickness`` has none."""
-    from ..grid.periodic_grid import Grid
+def periodic_space(case: Case) -> PeriodicSpace:
+    """The periodic box of the case. Raises CaseError where ``thickness`` has no cells."""
+    from ..fluids.spaces.periodic import PeriodicSpace
 
     assert case.fluid.box is not None
-    return Grid(case.fluid.box, cells(case))
+    return PeriodicSpace(case.fluid.box, cells(case))
 
 
 def spacing(case: Case) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..assembly import costs
 from ..assembly.fluids.base import Term
-from ..assembly.fluids.on_grid import BAND
+from ..assembly.fluids.immersed import BAND
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation

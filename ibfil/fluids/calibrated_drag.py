@@ -34,22 +34,22 @@ from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
 from .. import cache
 from ..grid.kernels import KERNELS
-from ..grid.periodic_grid import Grid
 from ..version import __version__
-from . import mobility_table, torque_coupling
+from .coupling import TRANSLATION, Nodes
 from .immersed_boundary import slip_mobility
+from .spaces.periodic import PeriodicSpace
+from .torque_coupling import TorqueCoupling, spin_mobility
 
 PLACES = 8  # of the rod within a cell, for each direction
 
 
 @dataclass(frozen=True)
 class Rod:
-    """The rod that drag is measured on: its length and nodes, and the grid it is dragged through."""
+    """The rod that drag is measured on: its length and nodes, and the space it is dragged through."""
 
     length: float
     nodes: int
-    box: tuple[float, float, float]
-    cells: tuple[int, int, int]
+    space: PeriodicSpace
     kernel: str
     slip: float
     radius: float = 0.0  # that it spins with, below the kernel's scale; 0: its spin is not asked for
@@ -94,21 +94,19 @@ def match(rod: Rod) -> Match:
 
 def measure(rod: Rod) -> Match:
     """The drag of the rod, measured. Raises ValueError where its nodes' mobility is singular."""
-    grid, kernel = Grid(rod.box, rod.cells), KERNELS[rod.kernel]
-    table = mobility_table.octant(mobility_table.point_response(grid, 1.0), kernel.points)
-    slip = slip_mobility(rod.slip, kernel, grid, 1.0, _volume(rod))
-    s = np.linspace(-0.5 * rod.length, 0.5 * rod.length, rod.nodes)[:, None]
+    kernel = KERNELS[rod.kernel]
+    mobility = rod.space.mobility(TRANSLATION, kernel.points, 1.0)
+    own = TRANSLATION.own(slip_mobility(rod.slip, kernel, rod.space.spacing, 1.0, _volume(rod)))
     drags, weights = [], []
     for weight, frame in directions():
         for place in places(PLACES):
-            stencil = kernel.stencil(grid.coordinates(s * frame[0] + place * grid.spacing))
-            zeta = _drag(mobility_table.mobility(table, grid.cells, *stencil, slip)) / rod.length
+            zeta = _drag(mobility.matrix(_laid(rod, frame[0], place), own)) / rod.length
             drags.append(np.einsum("ac,cd,ad->a", frame, zeta, frame))
             weights.append(weight)
     par, *perp = np.transpose(drags)
     across, across_scatter = _mean(np.concatenate(perp), np.tile(weights, 2))
     along, along_scatter = _mean(par, np.array(weights))
-    return Match(across, along, across_scatter, along_scatter, *(_spin(rod, grid) if rod.radius else (0.0, 0.0)))
+    return Match(across, along, across_scatter, along_scatter, *(_spin(rod) if rod.radius else (0.0, 0.0)))
 
 
 def _volume(rod: Rod) -> np.ndarray:
@@ -118,21 +116,26 @@ def _volume(rod: Rod) -> np.ndarray:
     return volume
 
 
-def _spin(rod: Rod, grid: Grid) -> tuple[float, float]:
-    """The drag against spin, from torques that turn all nodes at unit rate (torque_coupling.py), and its scatter."""
-    kernel, volume = KERNELS[rod.kernel], _volume(rod)
-    own = np.zeros((rod.nodes, 4))
-    widest = kernel.twist_radius * grid.spacing / math.sqrt(1.0 + rod.slip)
-    own[:, 3] = torque_coupling.spin_mobility(np.full(rod.nodes, rod.radius), widest, rod.slip, 1.0, volume)
-    response = [mobility_table.point_response(grid, 1.0), torque_coupling.torque_response(grid, 1.0)]
-    table = mobility_table.octant(np.concatenate(response), kernel.points)
+def _laid(rod: Rod, along: np.ndarray, place: np.ndarray) -> Nodes:
+    """The nodes of the rod along a direction (3,), its middle at a place (3,) in a cell."""
+    space = rod.space
     s = np.linspace(-0.5 * rod.length, 0.5 * rod.length, rod.nodes)[:, None]
+    stencil = space.stencil(KERNELS[rod.kernel], s * along + place * space.spacing)
+    return Nodes(*stencil, np.tile(along, (rod.nodes, 1)))
+
+
+def _spin(rod: Rod) -> tuple[float, float]:
+    """The drag against spin, from torques that turn all nodes at unit rate (torque_coupling.py), and its scatter."""
+    kernel = KERNELS[rod.kernel]
+    widest = kernel.twist_radius * rod.space.spacing / math.sqrt(1.0 + rod.slip)
+    spin = spin_mobility(np.full(rod.nodes, rod.radius), widest, rod.slip, 1.0, _volume(rod))
+    coupling = TorqueCoupling(spin, np.ones(rod.nodes))
+    mobility, own = rod.space.mobility(coupling, kernel.points, 1.0), coupling.own(np.zeros(rod.nodes))
     drags, weights = [], []
     for weight, frame in directions():
         for place in places(PLACES):
-            base, phi = kernel.stencil(grid.coordinates(s * frame[0] + place * grid.spacing))
-            whole = torque_coupling.mobility(table, grid.cells, base, phi, np.tile(frame[0], (rod.nodes, 1)), own)
-            drags.append(_against(whole[:, 3, :, 3]))
+            whole = mobility.matrix(_laid(rod, frame[0], place), own)
+            drags.append(_against(whole[3::4, 3::4]))
             weights.append(weight)
     return _mean(np.array(drags) / rod.length, np.array(weights))
 
@@ -178,12 +181,12 @@ def places(count: int) -> np.ndarray:
 
 
 def _drag(matrix: np.ndarray) -> np.ndarray:
-    """The drag (3, 3) of nodes with the mobility (n, 3, n, 3) that move together. Raises ValueError."""
-    n = len(matrix)
+    """The drag (3, 3) of nodes with the mobility (3 n, 3 n) that move together. Raises ValueError."""
+    n = len(matrix) // 3
     with warnings.catch_warnings():
         warnings.simplefilter("error", LinAlgWarning)
         try:
-            force = solve(matrix.reshape(3 * n, 3 * n), np.tile(np.eye(3), (n, 1)), assume_a="pos")
+            force = solve(matrix, np.tile(np.eye(3), (n, 1)), assume_a="pos")
         except (LinAlgError, LinAlgWarning):
             raise ValueError("the mobility of a straight rod's nodes on this grid is singular") from None
     return force.reshape(n, 3, 3).sum(axis=0)

@@ -14,7 +14,7 @@ import numpy as np
 from ..grid.periodic_grid import Grid
 from ..grid.spreading import Stencil
 from .base import Flow
-from .mobility_table import mobility, pairs, point_response
+from .mobility_table import Octant, mobility, pairs, point_response
 
 
 class Coupling(Protocol):
@@ -29,12 +29,10 @@ class Coupling(Protocol):
     def response(self, grid: Grid, viscosity: float, alpha: float) -> np.ndarray:
         """The grid's response (k, nx, ny, nz) to one cell's unit force, all components that a pair of nodes needs."""
 
-    def matrix(self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray) -> np.ndarray:
-        """The whole mobility (c n, c n), with ``own`` (n, c) on its diagonal; ``table`` the octant of ``response``."""
+    def matrix(self, octant: Octant, nodes: Nodes, own: np.ndarray) -> np.ndarray:
+        """The whole mobility (c n, c n), with ``own`` (n, c) on its diagonal; of the octant of ``response``."""
 
-    def block(
-        self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray
-    ) -> np.ndarray:
+    def block(self, octant: Octant, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """The mobility (c k, c l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
 
     def own(self, slip: np.ndarray) -> np.ndarray:
@@ -80,16 +78,14 @@ class Translation:
         """The velocity of a unit force on one cell."""
         return point_response(grid, viscosity, alpha)
 
-    def matrix(self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray) -> np.ndarray:
+    def matrix(self, octant: Octant, nodes: Nodes, own: np.ndarray) -> np.ndarray:
         """The whole mobility (3 n, 3 n)."""
         n = len(own)
-        return mobility(table, cells, nodes.base, nodes.weights, own[:, 0]).reshape(3 * n, 3 * n)
+        return mobility(octant, nodes.base, nodes.weights, own[:, 0]).reshape(3 * n, 3 * n)
 
-    def block(
-        self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray
-    ) -> np.ndarray:
+    def block(self, octant: Octant, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """The mobility (3 k, 3 l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
-        out = pairs(table, cells, nodes.base, nodes.weights, own[:, 0], rows, columns)
+        out = pairs(octant, nodes.base, nodes.weights, own[:, 0], rows, columns)
         return out.reshape(3 * len(rows), 3 * len(columns))
 
     def own(self, slip: np.ndarray) -> np.ndarray:

@@ -18,25 +18,25 @@ from functools import cached_property
 import numpy as np
 
 from ..grid.kernels import Kernel
-from ..grid.periodic_grid import Grid
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from .base import Flow, Solution
 from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
 from .coupling import TRANSLATION, Coupling, Nodes
+from .spaces.base import Mobility, Space
 
 
 @dataclass(frozen=True)
 class Immersed:
-    """The ingredients of a grid fluid: grid, kernel, eta, slip (n,), drag against spin (n,) or None, background flow.
+    """The ingredients of an immersed-boundary fluid: space, kernel, eta, slip (n,), drag against spin (n,), flow.
 
-    The drag is that of rods whose turns do not go through the grid; None where nothing twists or all goes through it.
-    ``filaments`` are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number``
-    is the type of the mobility table's numbers and of the fields of a fluid with inertia, double or single precision
-    (relative error about 1e-7).
+    The drag against spin is None where nothing twists, or where twist torques go through the grid. ``filaments`` are
+    the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is the type of the
+    mobility table's numbers and of the fields of a fluid with inertia, double or single precision (relative error about
+    1e-7).
     """
 
-    grid: Grid
+    space: Space
     kernel: Kernel
     viscosity: float
     slip: np.ndarray
@@ -58,7 +58,7 @@ class Immersed:
 
     def stencil(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """First grid index (n, 3) and weights (n, 3, P) of the nodes r (n, 3)."""
-        return self.kernel.stencil(self.grid.coordinates(r))
+        return self.space.stencil(self.kernel, r)
 
     def nodes(self, r: np.ndarray, e3: np.ndarray) -> Nodes:
         """The nodes r (n, 3) with tangents e3 (n, 3) on the grid."""
@@ -68,16 +68,19 @@ class Immersed:
         """The motions (n, c) with which the background flow carries nodes at r (n, 3); None where there is none."""
         if self.flow is None:
             return None
-        return self.coupling.advected(self.flow, r, nodes.axes, time, self.grid.spacing)
+        return self.coupling.advected(self.flow, r, nodes.axes, time, self.space.spacing)
+
+    def mobility(self, alpha: float = 0.0) -> Mobility:
+        """The exact mobility of nodes, without their own; alpha is density over time, zero in Stokes flow."""
+        return self.space.mobility(self.coupling, self.kernel.points, self.viscosity, alpha, self.number)
 
 
-def slip_mobility(fraction: float, kernel: Kernel, grid: Grid, viscosity: float, volume: np.ndarray) -> np.ndarray:
+def slip_mobility(fraction: float, kernel: Kernel, h: float, viscosity: float, volume: np.ndarray) -> np.ndarray:
     """s = eps (h / 2 Lc)/(6 pi eta a), a the kernel's point radius, Lc (n,) the nodes' control volumes.
 
     The same slip per length of rod everywhere: an end's node, of half a volume, slips by twice as much under a force.
     With the spacing in place of Lc the ends would be off, and the whole only of first order in the spacing.
     """
-    h = grid.spacing
     return fraction * (h / (2 * volume)) / (6 * np.pi * viscosity * kernel.point_radius * h)
 
 

@@ -23,7 +23,7 @@ class InertialFields(GridFields):
     """The fields of ``fluid`` as it is, with the forces that act now."""
 
     def __init__(self, fluid: NavierStokes, flow: Flow | None, threads: int = 1) -> None:
-        super().__init__(fluid.immersed.grid, fluid.immersed.viscosity, flow, threads)
+        super().__init__(fluid.grid, fluid.immersed.viscosity, flow, threads)
         self._fluid = fluid
 
     def _velocity(self, force: np.ndarray) -> np.ndarray:

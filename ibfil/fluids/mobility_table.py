@@ -11,7 +11,7 @@ as a kernel: a pair is mirrored into the octant instead of each of its terms.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,10 +20,6 @@ from scipy.fft import irfftn
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol
 from ..linalg.vectors import NOT_NEGATIVE
-
-if TYPE_CHECKING:
-    pass
-
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SIX = (0,) * 6
@@ -41,13 +37,23 @@ def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarr
     return out
 
 
-def octant(response: np.ndarray, points: int) -> np.ndarray:
-    """The octant of G that every pair can be mirrored into, with a rim of points - 1 cells: (x, y, z and part)."""
+class Octant(NamedTuple):
+    """The octant of a response that every pair of nodes can be mirrored into.
+
+    ``values`` (x, y, z and part) have a rim of a kernel's points less one; distances are taken modulo ``cells`` (3,).
+    """
+
+    values: np.ndarray
+    cells: np.ndarray
+
+
+def octant(response: np.ndarray, points: int, number: type = np.float64) -> Octant:
+    """The octant of a response (k, nx, ny, nz) on a periodic grid, for kernels of so many points."""
     rim = points - 1
     axes = [np.arange(-rim, n // 2 + rim + 1) % n for n in response.shape[1:]]
     cut = response[:, axes[0][:, None, None], axes[1][None, :, None], axes[2][None, None, :]]
     table = np.ascontiguousarray(np.moveaxis(cut, 0, 3))
-    return table.reshape(*table.shape[:2], -1)
+    return Octant(table.reshape(*table.shape[:2], -1).astype(number), np.array(response.shape[1:], np.int64))
 
 
 @njit(cache=True, inline="always")
@@ -81,8 +87,8 @@ def _plane_sums(table, corner, c, acc, unit, points):
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit, points):
-    """All components of the table for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
+def sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points):
+    """All components of the octant for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
 
     ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` and ``points`` tuples of k and of P
     entries: what the compiler knows of k and P. Returns the signs (3,) of the mirrored axes, for components beyond the
@@ -92,7 +98,7 @@ def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit, points):
     corner = (0, 0, 0)
     sign = (1.0, 1.0, 1.0)
     for axis in range(3):
-        n = cells[axis]
+        n = octant.cells[axis]
         d = (base[a, axis] - base[b, axis]) % n
         mirrored = d > n // 2
         u, v = (b, a) if mirrored else (a, b)  # seen from the other node the axis points the other way
@@ -109,7 +115,7 @@ def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit, points):
             corner, sign = (corner[0], at, 0), (sign[0], s, 1.0)
         else:
             corner, sign = (corner[0], corner[1], parts * at), (sign[0], sign[1], s)
-    _plane_sums(table, corner, c, acc, unit, points)
+    _plane_sums(octant.values, corner, c, acc, unit, points)
     for x in range(parts):
         total = 0.0
         for k in range(2 * p - 1):
@@ -122,14 +128,14 @@ def sum_pair(table, cells, base, weights, a, b, c, acc, sums, unit, points):
 
 
 @njit(cache=True)
-def _pairs(table, cells, base, weights, slip, rows, columns, points):
+def _pairs(octant, base, weights, slip, rows, columns, points):
     terms = 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((rows.size, 3, columns.size, 3))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX, points)
+            sum_pair(octant, base, weights, a, b, c, acc, sums, _SIX, points)
             for x in range(3):
                 out[i, x, j, x] = sums[x] + (slip[a] if a == b else 0.0)
             out[i, 0, j, 1] = out[i, 1, j, 0] = sums[3]
@@ -139,13 +145,13 @@ def _pairs(table, cells, base, weights, slip, rows, columns, points):
 
 
 @njit(cache=True)
-def _mobility(table, cells, base, weights, slip, points):
+def _mobility(octant, base, weights, slip, points):
     n, terms = weights.shape[0], 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((n, 3, n, 3))
     for a in range(n):
         for b in range(a, n):
-            sum_pair(table, cells, base, weights, a, b, c, acc, sums, _SIX, points)
+            sum_pair(octant, base, weights, a, b, c, acc, sums, _SIX, points)
             for x in range(3):
                 out[a, x, b, x] = out[b, x, a, x] = sums[x]
             out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = sums[3]
@@ -157,23 +163,15 @@ def _mobility(table, cells, base, weights, slip, points):
 
 
 def pairs(
-    table: np.ndarray,
-    cells: np.ndarray,
-    base: np.ndarray,
-    weights: np.ndarray,
-    slip: np.ndarray,
-    rows: np.ndarray,
-    columns: np.ndarray,
+    octant: Octant, base: np.ndarray, weights: np.ndarray, slip: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> np.ndarray:
     """The mobility (len(rows), 3, len(columns), 3) between nodes, with slip[i] added on the diagonal of node i.
 
-    ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils, ``table`` the octant.
+    ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils.
     """
-    return _pairs(table, cells, base, weights, slip, rows, columns, (0,) * weights.shape[2])
+    return _pairs(octant, base, weights, slip, rows, columns, (0,) * weights.shape[2])
 
 
-def mobility(
-    table: np.ndarray, cells: np.ndarray, base: np.ndarray, weights: np.ndarray, slip: np.ndarray
-) -> np.ndarray:
+def mobility(octant: Octant, base: np.ndarray, weights: np.ndarray, slip: np.ndarray) -> np.ndarray:
     """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
-    return _mobility(table, cells, base, weights, slip, (0,) * weights.shape[2])
+    return _mobility(octant, base, weights, slip, (0,) * weights.shape[2])

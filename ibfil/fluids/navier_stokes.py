@@ -43,6 +43,7 @@ class Workspace:
     """
 
     def __init__(self, grid: Grid, vectors: int = 1, threads: int = 1, number: type = np.float64) -> None:
+        self.grid = grid
         nx, ny, nz = (int(n) for n in grid.cells)
         self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS, number=number)
         self._slab = SlabFFT((nx, ny, nz), 3 * vectors, threads, number)
@@ -94,7 +95,8 @@ class NavierStokes:
         background: Background | None = None,
     ) -> None:
         self.immersed, self.density = immersed, density
-        self.history = History(immersed.grid, density, immersed.viscosity, immersed.number)
+        self.grid = workspace.grid
+        self.history = History(self.grid, density, immersed.viscosity, immersed.number)
         self._make, self.workspace, self._background = operator, workspace, background
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: _Asked | None = None
@@ -146,7 +148,7 @@ class NavierStokes:
 
     def longest_step(self) -> float:
         """That in which the fastest fluid crosses COURANT cells."""
-        return COURANT * self.immersed.grid.spacing / self.fastest if self.fastest > 0 else np.inf
+        return COURANT * self.grid.spacing / self.fastest if self.fastest > 0 else np.inf
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float

@@ -22,7 +22,6 @@ from ..grid.periodic_grid import Grid
 from ..grid.spectral import project
 from ..grid.spreading import interpolate, spread
 from ..linalg import gmres
-from . import mobility_table
 from .base import Memoryless
 from .condensation import Reduced
 from .coupling import Nodes
@@ -111,8 +110,7 @@ class Tabulated(Memoryless, ABC):
 
     def __init__(self, immersed: Immersed, alpha: float = 0.0) -> None:
         self.immersed = immersed
-        response = immersed.coupling.response(immersed.grid, immersed.viscosity, alpha)
-        self._table: np.ndarray = mobility_table.octant(response, immersed.kernel.points).astype(immersed.number)
+        self._mobility = immersed.mobility(alpha)
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
@@ -123,7 +121,7 @@ class Tabulated(Memoryless, ABC):
         axes = np.concatenate([np.zeros_like(points), coupling.axes(e3)])
         nodes = Nodes(*immersed.stencil(np.concatenate([points, r])), axes)
         rows, columns = np.arange(k), np.arange(k, k + n)
-        block = coupling.block(self._table, immersed.grid.cells, nodes, np.zeros((k + n, c)), rows, columns)
+        block = self._mobility.block(nodes, np.zeros((k + n, c)), rows, columns)
         u = (block @ force[:, :c].ravel()).reshape(k, c)[:, :3]
         return u if immersed.flow is None else u + immersed.flow(points, time)
 
@@ -138,12 +136,11 @@ class Tabulated(Memoryless, ABC):
 
     def matrix(self, nodes: Nodes, own: np.ndarray) -> np.ndarray:
         """The exact mobility (c n, c n) of nodes, with ``own`` (n, c) on its diagonal."""
-        return self.immersed.coupling.matrix(self._table, self.immersed.grid.cells, nodes, own)
+        return self._mobility.matrix(nodes, own)
 
     def block(self, nodes: Nodes, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """The exact mobility (c k, c l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
-        immersed = self.immersed
-        return immersed.coupling.block(self._table, immersed.grid.cells, nodes, immersed.own, rows, columns)
+        return self._mobility.block(nodes, self.immersed.own, rows, columns)
 
 
 class StokesByTable(Tabulated):

@@ -40,7 +40,7 @@ from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol, half_curl, project
 from ..grid.spreading import interpolate, spread
-from .mobility_table import COMPONENTS, point_response, sum_pair
+from .mobility_table import COMPONENTS, Octant, point_response, sum_pair
 
 if TYPE_CHECKING:
     from .coupling import Nodes
@@ -77,14 +77,14 @@ def _between(sums, sign, d, e):
 
 
 @njit(cache=True)
-def _pairs(table, cells, base, weights, axes, own, rows, columns, points):
+def _pairs(octant, base, weights, axes, own, rows, columns, points):
     terms = 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
     out = np.empty((rows.size, 4, columns.size, 4))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            sign = sum_pair(table, cells, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
+            sign = sum_pair(octant, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
             if a == b:
                 sums[6:9] = 0.0  # odd, and so nothing but round-off
             for x in range(3):
@@ -102,13 +102,13 @@ def _pairs(table, cells, base, weights, axes, own, rows, columns, points):
 
 
 @njit(cache=True)
-def _mobility(table, cells, base, weights, axes, own, points):
+def _mobility(octant, base, weights, axes, own, points):
     n, terms = weights.shape[0], 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
     out = np.empty((n, 4, n, 4))
     for a in range(n):
         for b in range(a, n):
-            sign = sum_pair(table, cells, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
+            sign = sum_pair(octant, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
             if a == b:
                 sums[6:9] = 0.0  # odd, and so nothing but round-off
             for x in range(3):
@@ -125,8 +125,7 @@ def _mobility(table, cells, base, weights, axes, own, points):
 
 
 def pairs(
-    table: np.ndarray,
-    cells: np.ndarray,
+    octant: Octant,
     base: np.ndarray,
     weights: np.ndarray,
     axes: np.ndarray,
@@ -138,14 +137,12 @@ def pairs(
 
     ``axes`` are unit tangents, zero where a node does not twist: then no torque of it, and no spin.
     """
-    return _pairs(table, cells, base, weights, axes, own, rows, columns, (0,) * weights.shape[2])
+    return _pairs(octant, base, weights, axes, own, rows, columns, (0,) * weights.shape[2])
 
 
-def mobility(
-    table: np.ndarray, cells: np.ndarray, base: np.ndarray, weights: np.ndarray, axes: np.ndarray, own: np.ndarray
-) -> np.ndarray:
+def mobility(octant: Octant, base: np.ndarray, weights: np.ndarray, axes: np.ndarray, own: np.ndarray) -> np.ndarray:
     """The whole matrix (n, 4, n, 4), symmetric to the last bit; arguments as for ``pairs``."""
-    return _mobility(table, cells, base, weights, axes, own, (0,) * weights.shape[2])
+    return _mobility(octant, base, weights, axes, own, (0,) * weights.shape[2])
 
 
 class TorqueStokesSolve:
@@ -212,16 +209,14 @@ class TorqueCoupling:
         """G, R and W."""
         return np.concatenate([point_response(grid, viscosity, alpha), torque_response(grid, viscosity, alpha)])
 
-    def matrix(self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray) -> np.ndarray:
+    def matrix(self, octant: Octant, nodes: Nodes, own: np.ndarray) -> np.ndarray:
         """The whole mobility (4 n, 4 n)."""
         n = len(own)
-        return mobility(table, cells, nodes.base, nodes.weights, nodes.axes, own).reshape(4 * n, 4 * n)
+        return mobility(octant, nodes.base, nodes.weights, nodes.axes, own).reshape(4 * n, 4 * n)
 
-    def block(
-        self, table: np.ndarray, cells: np.ndarray, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray
-    ) -> np.ndarray:
+    def block(self, octant: Octant, nodes: Nodes, own: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """The mobility (4 k, 4 l) between nodes ``rows`` (k,) and ``columns`` (l,)."""
-        out = pairs(table, cells, nodes.base, nodes.weights, nodes.axes, own, rows, columns)
+        out = pairs(octant, nodes.base, nodes.weights, nodes.axes, own, rows, columns)
         return out.reshape(4 * len(rows), 4 * len(columns))
 
     def own(self, slip: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from ibfil.fluids.navier_stokes import NavierStokes
 
 def omega_cross_u(it: NavierStokes, u: np.ndarray) -> np.ndarray:
     """P (omega x u) by modes, on a grid twice as fine, where no product is aliased onto those of u's grid."""
-    cells, length = it.immersed.grid.cells, it.immersed.grid.box
+    cells, length = it.grid.cells, it.grid.box
     fine = [2 * int(n) for n in cells]
     wide = np.zeros((3, fine[0], fine[1], fine[2] // 2 + 1), complex)
     x, y, z = ((n - 1) // 2 for n in cells)
@@ -49,7 +49,7 @@ def test_aliases_of_a_field_as_rods_make_it_are_few():
     it = fluid((32, 32, 32), viscosity=1.0)
     response = it.response(FAR, ZERO, 0.0, 1e6)
     it.advance(response, np.array([[30.0, -10.0, 20.0]]))
-    u = np.fft.irfftn(it.history.now * smooth(it), it.immersed.grid.cells, axes=(1, 2, 3)) * 32**3
+    u = np.fft.irfftn(it.history.now * smooth(it), it.grid.cells, axes=(1, 2, 3)) * 32**3
     expected = smooth(it) * omega_cross_u(it, u)
     wrong, size = np.linalg.norm(advection(it) - expected), np.linalg.norm(expected)
     assert 1e-3 * size < wrong < 0.03 * size
@@ -59,11 +59,11 @@ def test_advection_does_no_work_and_moves_no_mean():
     it = fluid()
     u = waves(it)
     begin(it, u)
-    n = np.fft.irfftn(advection(it), it.immersed.grid.cells, axes=(1, 2, 3)) * it.workspace.flow.size
+    n = np.fft.irfftn(advection(it), it.grid.cells, axes=(1, 2, 3)) * it.workspace.flow.size
     assert np.abs(np.sum(u * n)) < 1e-12 * np.sum(np.abs(u * n))
     assert np.abs(n.mean(axis=(1, 2, 3))).max() < 1e-17
     assert it.fastest == pytest.approx(np.abs(u).max(), rel=1e-12)
-    assert it.longest_step() == pytest.approx(it.immersed.grid.spacing / np.abs(u).max(), rel=1e-12)
+    assert it.longest_step() == pytest.approx(it.grid.spacing / np.abs(u).max(), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ibfil.fluids.fields import GridFields
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.grid.kernels import PESKIN4
 from ibfil.grid.periodic_grid import Grid
 
@@ -91,7 +92,7 @@ def test_probes_see_what_a_node_there_would_feel(pushed):
 
     grid, r, force, stencil = pushed
     points = np.array([[0.0, 0.1, 0.0], [0.9, -1.1, 0.7]])
-    fluid = StokesByTable(Immersed(grid, PESKIN4, 0.7, np.full(len(r), 0.3), None))
+    fluid = StokesByTable(Immersed(PeriodicSpace.of(grid), PESKIN4, 0.7, np.full(len(r), 0.3), None))
     found = fluid.velocity_at(points, r, np.zeros_like(r), force, 0.0)
     u = GridFields(grid, 0.7, None).evaluate(*stencil, force, 0.0, ["velocity"])["velocity"]
     expected = interpolate(*PESKIN4.stencil(grid.coordinates(points)), np.moveaxis(u, -1, 0).astype(float))

@@ -20,11 +20,12 @@ from ibfil.check.warnings import warnings
 from ibfil.errors import CaseError
 from ibfil.fluids import calibrated_drag, mobility_table
 from ibfil.fluids.calibrated_drag import Match, Rod, directions, measure, places
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
 from ibfil.simulation.simulation import Simulation
 
-SMALL = Rod(0.5, 11, (1.6, 1.6, 1.6), (32, 32, 32), "peskin4", 0.01)
+SMALL = Rod(0.5, 11, PeriodicSpace((1.6, 1.6, 1.6), (32, 32, 32)), "peskin4", 0.01)
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +46,7 @@ def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def test_known_numbers(length, cells, perp, par):
     """Independent code: rods in random directions, nodes a cell apart, to three digits."""
     nodes = round(length * cells / 3.2) + 1
-    found = measure(Rod(length, nodes, (3.2,) * 3, (cells,) * 3, "peskin4", 0.0))
+    found = measure(Rod(length, nodes, PeriodicSpace((3.2,) * 3, (cells,) * 3), "peskin4", 0.0))
     assert found.perp == pytest.approx(perp, rel=5e-3)
     assert found.par == pytest.approx(par, rel=5e-3)
     assert found.ratio == pytest.approx(perp / par, rel=5e-3)
@@ -58,21 +59,21 @@ def test_one_rod_on_a_grid_line_of_the_known_drag():
     table = mobility_table.octant(mobility_table.point_response(grid, 1.0), kernel.points)
     line = np.linspace(-0.5, 0.5, 21)[:, None] * np.array([1.0, 0, 0])
     drag = calibrated_drag._drag(
-        mobility_table.mobility(table, grid.cells, *kernel.stencil(grid.coordinates(line)), np.zeros(21))
+        mobility_table.mobility(table, *kernel.stencil(grid.coordinates(line)), np.zeros(21)).reshape(63, 63)
     )
     assert np.diag(drag) == pytest.approx([3.866703, 5.760179, 5.760179], rel=1e-6)
     assert drag == pytest.approx(np.diag(np.diag(drag)), abs=1e-8)
 
 
 def test_only_ratios_of_lengths_count():
-    large = Rod(5.0, SMALL.nodes, (16.0,) * 3, SMALL.cells, SMALL.kernel, SMALL.slip)
+    large = Rod(5.0, SMALL.nodes, PeriodicSpace((16.0,) * 3, SMALL.space.cells), SMALL.kernel, SMALL.slip)
     one, other = measure(SMALL), measure(large)
     assert (one.perp, one.par, one.scatter) == pytest.approx((other.perp, other.par, other.scatter), rel=1e-9)
 
 
 def test_scatter_is_what_places_and_directions_differ_by():
     """The mean and the deviation again, rod by rod, through forces that give the nodes one velocity."""
-    grid, kernel = Grid(SMALL.box, SMALL.cells), KERNELS[SMALL.kernel]
+    grid, kernel = SMALL.space.grid, KERNELS[SMALL.kernel]
     table = mobility_table.octant(mobility_table.point_response(grid, 1.0), kernel.points)
     volume = SMALL.length / (SMALL.nodes - 1) * np.array([0.5, *[1.0] * (SMALL.nodes - 2), 0.5])
     slip = SMALL.slip * (grid.spacing / (2 * volume)) / (6 * np.pi * kernel.point_radius * grid.spacing)
@@ -81,7 +82,7 @@ def test_scatter_is_what_places_and_directions_differ_by():
         for place in places(8):
             r = np.linspace(-0.25, 0.25, 11)[:, None] * t + place * grid.spacing
             stencil = kernel.stencil(grid.coordinates(r))
-            m = mobility_table.mobility(table, grid.cells, *stencil, slip)
+            m = mobility_table.mobility(table, *stencil, slip)
             m = m.reshape(33, 33)
             along.append(np.tile(t, 11) @ np.linalg.solve(m, np.tile(t, 11)) / 0.5)
             across += [np.tile(u, 11) @ np.linalg.solve(m, np.tile(u, 11)) / 0.5 for u in (n, b)]
@@ -99,10 +100,8 @@ def test_scatter_is_what_places_and_directions_differ_by():
 
 def test_nodes_closer_than_the_grid_resolves_are_refused():
     with pytest.raises(ValueError, match="singular"):
-        measure(Rod(0.5, 41, SMALL.box, SMALL.cells, SMALL.kernel, 0.0))
-    assert measure(Rod(0.5, 41, SMALL.box, SMALL.cells, SMALL.kernel, 0.01)).perp == pytest.approx(
-        measure(SMALL).perp, rel=0.02
-    )
+        measure(Rod(0.5, 41, SMALL.space, SMALL.kernel, 0.0))
+    assert measure(Rod(0.5, 41, SMALL.space, SMALL.kernel, 0.01)).perp == pytest.approx(measure(SMALL).perp, rel=0.02)
 
 
 def test_directions_are_an_exact_mean_over_the_sphere():
@@ -152,7 +151,8 @@ def test_what_was_measured_is_not_measured_again(monkeypatch, cache):
     assert kept == calibrated_drag.cache_file(SMALL)
     monkeypatch.setattr(calibrated_drag, "measure", never)
     assert again(SMALL) == found
-    for change in ({"length": 0.4}, {"nodes": 12}, {"box": (1.6, 1.6, 3.2)}, {"kernel": "es5"}, {"slip": 0.02}):
+    wider = PeriodicSpace((1.6, 1.6, 3.2), (32, 32, 64))
+    for change in ({"length": 0.4}, {"nodes": 12}, {"space": wider}, {"kernel": "es5"}, {"slip": 0.02}):
         with pytest.raises(AssertionError, match="measured"):
             again(Rod(**{**SMALL.__dict__, **change}))
 
@@ -211,7 +211,7 @@ def test_each_filament_has_its_own():
     made = case(rods=two)
     coarse, fine = (assembly_drag.matching(made, made.filaments[name]) for name in two)
     assert coarse == measure(SMALL)
-    assert fine == measure(Rod(0.5, 21, SMALL.box, SMALL.cells, SMALL.kernel, SMALL.slip))
+    assert fine == measure(Rod(0.5, 21, SMALL.space, SMALL.kernel, SMALL.slip))
     found = groups(Simulation(made))
     assert found["coarse: matched zeta_perp/eta"] == coarse.perp
     assert found["fine: matched zeta_perp/eta"] == fine.perp
@@ -294,7 +294,7 @@ def test_spin_is_that_of_a_rod_spun_through_the_grid():
     b = 1.504506 * 0.1 / np.sqrt(1.01)
     found = {}
     for length, nodes in ((1.0, 11), (2.0, 21)):
-        rod = Rod(length, nodes, (3.2,) * 3, (32,) * 3, "peskin4", 0.01, b)
+        rod = Rod(length, nodes, PeriodicSpace((3.2,) * 3, (32,) * 3), "peskin4", 0.01, b)
         found[length] = measure(rod)
         assert found[length].perp == measure(replace(rod, radius=0.0)).perp
     assert measure(replace(rod, radius=0.0)).spin == 0
@@ -316,7 +316,7 @@ def test_a_case_in_rft_takes_its_spin_from_the_grid_where_rotation_is_grid():
         filament = case.filaments["rod"]
         spins[rotation] = float(assembly_drag.drag_coefficients(case, filament, np.full(11, 0.1))[2][0])
         assert ("fluid.rotation" in idle_keys(case)) == (rotation == "local")
-    matched_rod = Rod(0.5, 6, (1.6,) * 3, (16,) * 3, "peskin4", 0.01, 0.1)
+    matched_rod = Rod(0.5, 6, PeriodicSpace((1.6,) * 3, (16,) * 3), "peskin4", 0.01, 0.1)
     assert spins["local"] == pytest.approx(8 * np.pi * 0.01)
     assert spins["grid"] == pytest.approx(2 * measure(matched_rod).spin)
     assert spins["grid"] > 1.05 * spins["local"]  # its ends

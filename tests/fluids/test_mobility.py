@@ -38,7 +38,7 @@ def matrix(kernel: Kernel, cells: tuple[int, int, int], r: np.ndarray, slip: np.
     grid = Grid([n * H for n in cells], cells)
     base, weights = kernel.stencil(grid.coordinates(r))
     table = mobility_table.octant(response(cells, viscosity), kernel.points)
-    return mobility_table.mobility(table, grid.cells, base, weights, slip)
+    return mobility_table.mobility(table, base, weights, slip)
 
 
 # --- the response to a force on one cell -----------------------------------------------------------------------------
@@ -118,7 +118,7 @@ def test_every_octant_is_the_full_response_summed_term_by_term():
     r = grid.origin + H * (places + rng.uniform(-0.45, 0.45, places.shape))
     base, weights = kernel.stencil(grid.coordinates(r))
     table = mobility_table.octant(g, kernel.points)
-    got = mobility_table.pairs(table, grid.cells, base, weights, np.zeros(len(r)), np.arange(1), np.arange(len(r)))[0]
+    got = mobility_table.pairs(table, base, weights, np.zeros(len(r)), np.arange(1), np.arange(len(r)))[0]
     full = np.empty((3, 3, *cells))
     for c, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
         full[a, b] = full[b, a] = g[c]
@@ -154,8 +154,8 @@ def test_pairs_are_blocks_of_the_matrix(kernel, cells):
     base, weights = kernel.stencil(grid.coordinates(r))
     table = mobility_table.octant(response(cells), kernel.points)
     rows, columns = np.array([3, 0, 11, 5]), np.array([5, 9, 3])
-    block = mobility_table.pairs(table, grid.cells, base, weights, slip, rows, columns)
-    whole = mobility_table.mobility(table, grid.cells, base, weights, slip)
+    block = mobility_table.pairs(table, base, weights, slip, rows, columns)
+    whole = mobility_table.mobility(table, base, weights, slip)
     assert np.abs(block - whole[rows][:, :, columns]).max() < 1e-14 * whole.max()
 
 
@@ -211,7 +211,7 @@ def test_spectrum_of_a_rod_whose_nodes_are_closer_than_cells():
     kernel = KERNELS["peskin4"]
     base, weights = kernel.stencil(grid.coordinates(r))
     table = mobility_table.octant(mobility_table.point_response(grid, 1.0), 4)
-    m = mobility_table.mobility(table, grid.cells, base, weights, np.zeros(41)).reshape(123, 123)
+    m = mobility_table.mobility(table, base, weights, np.zeros(41)).reshape(123, 123)
     values = np.linalg.eigvalsh(m)
     assert values.max() == pytest.approx(12.5668, abs=1e-3)
     assert values.min() == pytest.approx(1.557e-6, abs=0.0005e-6)  # four digits

@@ -12,6 +12,7 @@ from ibfil.fluids.fields import GridFields
 from ibfil.fluids.immersed_boundary import Immersed
 from ibfil.fluids.inertial_fields import InertialFields
 from ibfil.fluids.navier_stokes import NavierStokes, Workspace
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.stokes import StokesByTable
 from ibfil.fluids.torque_coupling import TorqueCoupling, TorqueStokesSolve
 from ibfil.grid.kernels import KERNELS
@@ -102,17 +103,17 @@ def test_a_point_force_sets_the_fluid_in_motion_as_the_unsteady_stokes_equation_
             answer = response.forced(force, NOTHING, ZERO)
             it.advance(response, answer.force)
         base, weights = it.immersed.stencil(FAR)
-        (kx, ky, kz), (sx, sy, sz) = it.immersed.grid.wave_numbers()
-        blob = np.zeros(it.immersed.grid.cells)
+        (kx, ky, kz), (sx, sy, sz) = it.grid.wave_numbers()
+        blob = np.zeros(it.grid.cells)
         for i in np.ndindex(4, 4, 4):
-            at = tuple((base[0] + i) % it.immersed.grid.cells)
+            at = tuple((base[0] + i) % it.grid.cells)
             blob[at] += weights[0, 0, i[0]] * weights[0, 1, i[1]] * weights[0, 2, i[2]]
-        f = np.fft.rfftn(blob) * force.T[:, :, None, None] / it.immersed.grid.spacing**3
+        f = np.fft.rfftn(blob) * force.T[:, :, None, None] / it.grid.spacing**3
         k = np.stack(np.broadcast_arrays(kx[:, None, None], ky[:, None], kz))
         square, true = np.sum(k * k, axis=0), sx[:, None, None] + sy[:, None] + sz
         f -= k * np.sum(k * f, axis=0) / np.where(square > 0, square, 1.0)
         f *= -np.expm1(-viscosity / density * true * end) / np.where(true > 0, viscosity * true, np.inf)
-        u = np.fft.irfftn(f, it.immersed.grid.cells, axes=(1, 2, 3))
+        u = np.fft.irfftn(f, it.grid.cells, axes=(1, 2, 3))
         expected = np.sum(u * blob, axis=(1, 2, 3))
         errors.append(np.abs(it.velocity_at(FAR, FAR, ZERO, force, end)[0] - expected).max() / np.abs(expected).max())
         assert np.abs(answer.move[0] / tau - expected).max() < 0.05 * np.abs(expected).max()
@@ -144,7 +145,7 @@ def test_the_pressure_is_that_of_the_flow_and_of_the_forces(flow):
     assert found["pressure"] == pytest.approx(1.7 / 4 * (np.cos(2 * x) + np.cos(2 * y)), abs=1e-6)
     force = np.array([[1.0, -0.3, 0.7]])
     pushed = fields.evaluate(base, weights, force, 0.0, names)["pressure"] - found["pressure"]
-    steady = GridFields(it.immersed.grid, 0.1, None).evaluate(base, weights, force, 0.0, names)["pressure"]
+    steady = GridFields(it.grid, 0.1, None).evaluate(base, weights, force, 0.0, names)["pressure"]
     assert pushed == pytest.approx(steady, abs=1e-5 * float(np.abs(steady).max()))
 
 
@@ -194,7 +195,8 @@ def test_memory_is_all_there_is():
 def stirred() -> tuple[NavierStokes, Nodes]:
     """A fluid with one node that stirs it, and the node."""
     grid, axis = Grid([2 * np.pi] * 3, [16] * 3), np.array([[0.6, 0.0, 0.8]])
-    made = Immersed(grid, KERNELS["peskin4"], 0.3, np.zeros(1), None, coupling=TorqueCoupling(np.zeros(1), np.ones(1)))
+    coupling = TorqueCoupling(np.zeros(1), np.ones(1))
+    made = Immersed(PeriodicSpace.of(grid), KERNELS["peskin4"], 0.3, np.zeros(1), None, coupling=coupling)
     workspace = Workspace(grid, vectors=2)
     return NavierStokes(made, 2.0, lambda alpha: StokesByTable(made, alpha), workspace), made.nodes(FAR, axis)
 
@@ -205,13 +207,10 @@ def test_a_node_turns_with_half_the_vorticity_of_the_past():
     spin = it.response(FAR, nodes.axes, 0.0, 1e-9).flow[0, 3]  # nothing changes in so short a step
     k = np.stack(
         np.broadcast_arrays(
-            *(
-                a.reshape(s)
-                for a, s in zip(it.immersed.grid.wave_numbers()[0], [(-1, 1, 1), (-1, 1), (-1,)], strict=True)
-            )
+            *(a.reshape(s) for a, s in zip(it.grid.wave_numbers()[0], [(-1, 1, 1), (-1, 1), (-1,)], strict=True))
         )
     )
-    curl = np.fft.irfftn(1j * np.cross(k, it.history.now, axis=0), it.immersed.grid.cells, axes=(1, 2, 3)) * 16**3
+    curl = np.fft.irfftn(1j * np.cross(k, it.history.now, axis=0), it.grid.cells, axes=(1, 2, 3)) * 16**3
     expected = 0.5 * interpolate(nodes.base, nodes.weights, curl)[0] @ nodes.axes[0]
     assert abs(expected) > 0.01
     assert spin == pytest.approx(expected, rel=1e-6)
@@ -221,6 +220,6 @@ def test_a_torque_on_fluid_at_rest_leaves_the_flow_that_the_stirred_solve_has():
     it, nodes = stirred()
     tau, push = 0.2, np.array([[0.3, -0.1, 0.2, 0.7]])
     it.advance(it.response(FAR, nodes.axes, 0.0, tau), push)
-    solve = TorqueStokesSolve(it.immersed.grid, 0.3, alpha=2.0 / tau)
+    solve = TorqueStokesSolve(it.grid, 0.3, alpha=2.0 / tau)
     expected = solve.velocity(nodes.base, nodes.weights, it.immersed.coupling.to_grid(nodes.axes, push))[0, :3]
     assert it.velocity_at(FAR, FAR, nodes.axes, push, tau)[0] == pytest.approx(expected, rel=1e-10)

@@ -7,6 +7,7 @@ import pytest
 from scipy.special import erfc
 
 from ibfil.fluids.immersed_boundary import Immersed, slip_mobility
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.stokes import StokesByFFT, StokesByTable, StokesSolve
 from ibfil.grid.kernels import KERNELS, Kernel
 from ibfil.grid.periodic_grid import Grid
@@ -18,11 +19,11 @@ NOTHING = Prescribed(np.zeros(0, np.int64), np.zeros(0))
 
 def immersed(grid: Grid, nodes: int, kernel: Kernel = KERNELS["peskin4"], eta=1.0, slip=0.0, **more) -> Immersed:
     """A fluid for ``nodes`` nodes with that slip mobility each, and no twist."""
-    return Immersed(grid, kernel, eta, np.full(nodes, slip), None, **more)
+    return Immersed(PeriodicSpace.of(grid), kernel, eta, np.full(nodes, slip), None, **more)
 
 
 def by_fft(fluid: Immersed) -> StokesByFFT:
-    return StokesByFFT(fluid, StokesSolve(fluid.grid, fluid.viscosity))
+    return StokesByFFT(fluid, StokesSolve(fluid.space.grid, fluid.viscosity))
 
 
 # --- a point force ---------------------------------------------------------------------------------------------------
@@ -154,10 +155,10 @@ def test_slip_is_a_part_of_a_nodes_mobility_and_constant_along_a_rod_for_any_spa
     kernel = KERNELS["bkp6"]
     grid = Grid([3.2] * 3, [64] * 3)
     ds = np.array([0.025, 0.05, 0.0125])  # h/2, h, h/4
-    s = slip_mobility(0.01, kernel, grid, 2.0, ds)
+    s = slip_mobility(0.01, kernel, grid.spacing, 2.0, ds)
     one = 1 / (6 * np.pi * 2.0 * 1.520 * 0.05)
     assert s == pytest.approx(0.01 * one * np.array([1.0, 0.5, 2.0]), rel=1e-14)
-    assert not slip_mobility(0.0, kernel, grid, 2.0, ds).any()
+    assert not slip_mobility(0.0, kernel, grid.spacing, 2.0, ds).any()
     assert s * ds == pytest.approx((s * ds)[0], rel=1e-14)  # velocity of a force per length
 
 

@@ -11,6 +11,7 @@ from helpers.scenes import slopes
 from ibfil.fluids import mobility_table
 from ibfil.fluids.fields import GridFields
 from ibfil.fluids.immersed_boundary import Immersed
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.stokes import StokesByFFT, StokesByTable, StokesSolve
 from ibfil.fluids.torque_coupling import TorqueCoupling, TorqueStokesSolve
 from ibfil.grid import spectral
@@ -41,7 +42,7 @@ def immersed(kernel, cells, count: int, eta: float = 1.3, slip: float = 0.02, se
     rng = np.random.default_rng(seed)
     grid = Grid([n * H for n in cells], cells)
     coupling = TorqueCoupling(rng.uniform(0, 5, count), np.where(np.arange(count) % 5 == 4, 0.0, 1.0))
-    return Immersed(grid, kernel, eta, np.full(count, slip), None, coupling=coupling)
+    return Immersed(PeriodicSpace.of(grid), kernel, eta, np.full(count, slip), None, coupling=coupling)
 
 
 # --- one operator, two ways ------------------------------------------------------------------------------------------
@@ -54,7 +55,7 @@ def test_table_is_the_fft_operator(kernel, cells):
     fluid = immersed(kernel, cells, count)
     r, e3 = scattered(cells, count, 1), tangents(count, 2)
     force = np.random.default_rng(3).standard_normal((count, 4))
-    solver = TorqueStokesSolve(fluid.grid, fluid.viscosity)
+    solver = TorqueStokesSolve(fluid.space.grid, fluid.viscosity)
     moves = []
     for made in (StokesByTable(fluid), StokesByFFT(fluid, solver)):
         moves.append(made.response(r, e3, 0.0, 1.0).forced(force, NONE, np.zeros((count, 4))).move)
@@ -75,8 +76,8 @@ def test_matrix_is_symmetric_and_positive_and_made_of_its_pairs(kernel):
     assert values.min() > -1e-14 * values.max()
     rows, columns = np.array([3, 0, 10, 5]), np.array([5, 9, 3])
     whole = made.matrix(nodes, fluid.own).reshape(count, 4, count, 4)
-    table = mobility_table.octant(fluid.coupling.response(fluid.grid, fluid.viscosity, 0.0), kernel.points)
-    block = fluid.coupling.block(table, fluid.grid.cells, nodes, fluid.own, rows, columns).reshape(4, 4, 3, 4)
+    table = mobility_table.octant(fluid.coupling.response(fluid.space.grid, fluid.viscosity, 0.0), kernel.points)
+    block = fluid.coupling.block(table, nodes, fluid.own, rows, columns).reshape(4, 4, 3, 4)
     assert np.abs(block - whole[rows][:, :, columns]).max() < 1e-13 * np.abs(whole).max()
 
 
@@ -85,7 +86,7 @@ def test_without_torques_it_is_the_mobility_of_forces():
     fluid = immersed(kernel, cells, count)
     r = scattered(cells, count, 6)
     whole = StokesByTable(fluid).matrix(fluid.nodes(r, tangents(count, 7)), fluid.own).reshape(count, 4, count, 4)
-    plain = Immersed(fluid.grid, kernel, fluid.viscosity, fluid.slip, None)
+    plain = Immersed(fluid.space, kernel, fluid.viscosity, fluid.slip, None)
     forces = StokesByTable(plain).matrix(plain.nodes(r, np.zeros((count, 3))), plain.own)
     assert np.array_equal(whole[:, :3, :, :3].reshape(3 * count, 3 * count), forces)
 
@@ -122,11 +123,11 @@ def test_power_of_forces_and_torques_is_what_the_fluid_and_the_slips_dissipate()
     force = np.random.default_rng(12).standard_normal((count, 4))
     answer = StokesByTable(fluid).response(r, e3, 0.0, 1.0).forced(force, NONE, np.zeros((count, 4)))
     coupling, (base, weights) = fluid.coupling, fluid.stencil(r)
-    fields = GridFields(fluid.grid, fluid.viscosity, None)
+    fields = GridFields(fluid.space.grid, fluid.viscosity, None)
     load_rates = coupling.to_grid(coupling.axes(e3), force)
     velocity = fields.evaluate(base, weights, load_rates, 0.0, ["velocity"])["velocity"].astype(float)
     modes = np.fft.rfftn(np.moveaxis(velocity, -1, 0), axes=(1, 2, 3))
-    _, (sx, sy, sz) = fluid.grid.wave_numbers()
+    _, (sx, sy, sz) = fluid.space.grid.wave_numbers()
     square = sx[:, None, None] + sy[None, :, None] + sz[None, None, :]
     twice = np.full(modes.shape[-1], 2.0)  # the modes that are not kept are the conjugates of those that are
     twice[0] = 1.0

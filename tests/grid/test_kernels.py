@@ -149,9 +149,8 @@ def table(cells: int, points: int) -> np.ndarray:
 def between(kernel: Kernel, cells: int, places: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Mobility (3, k, 3) of the first of ``places`` (n, 3) to forces on ``columns`` (k,), h = eta = 1."""
     base, weights = kernel.stencil(places)
-    shape = np.array([cells] * 3)
     none = np.zeros(len(places))
-    return mobility_table.pairs(table(cells, kernel.points), shape, base, weights, none, np.arange(1), columns)[0]
+    return mobility_table.pairs(table(cells, kernel.points), base, weights, none, np.arange(1), columns)[0]
 
 
 def self_mobility(kernel: Kernel, cells: int, places: np.ndarray) -> np.ndarray:

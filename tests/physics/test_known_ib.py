@@ -139,8 +139,8 @@ def swim(
 def slip_alike(monkeypatch):
     """All nodes slip alike, as in the code the numbers are of; here the ends', of half a volume, slip twice as much."""
 
-    def alike(fraction, kernel, grid, viscosity, volume):
-        return slip_mobility(fraction, kernel, grid, viscosity, np.full_like(volume, volume.max()))
+    def alike(fraction, kernel, h, viscosity, volume):
+        return slip_mobility(fraction, kernel, h, viscosity, np.full_like(volume, volume.max()))
 
     monkeypatch.setattr(immersed_boundary, "slip_mobility", alike)
 

@@ -20,6 +20,7 @@ import pytest
 from ibfil.case.reading import read_case
 from ibfil.fluids.immersed_boundary import Immersed
 from ibfil.fluids.navier_stokes import NavierStokes, Workspace
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.stokes import StokesByTable
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
@@ -35,7 +36,7 @@ def pumped(reynolds: float, cells: int, periods: int, steps: int) -> float:
     shape = (cells, TALL * cells, 1)
     h = 2 * np.pi / cells
     grid = Grid([2 * np.pi, 2 * np.pi * TALL, h], shape)
-    made = Immersed(grid, KERNELS["peskin4"], 1.0, np.zeros(cells), None)
+    made = Immersed(PeriodicSpace.of(grid), KERNELS["peskin4"], 1.0, np.zeros(cells), None)
     workspace = Workspace(grid)
     fluid = NavierStokes(made, reynolds, lambda alpha: StokesByTable(made, alpha), workspace)
     s, zero = h * np.arange(cells), np.zeros((cells, 3))

@@ -58,7 +58,7 @@ class NavierStokesModel(GridModel):
         from ...fluids.torque_coupling import TorqueStokesSolve
 
         threads = self.case.compute.threads
-        workspace = Workspace(immersed.grid, immersed.coupling.grid_vectors, threads, immersed.number)
+        workspace = Workspace(self.grid, immersed.coupling.grid_vectors, threads, immersed.number)
         shared = workspace.flow if immersed.number is np.float64 else None  # solvers by FFT are exact to round-off
         factor_cost = self.factor_cost(rods)
 
@@ -67,16 +67,16 @@ class NavierStokesModel(GridModel):
                 return stokes.StokesByTable(immersed, alpha)
             solver: Solver
             if immersed.coupling.grid_vectors == 1:
-                solver = stokes.StokesSolve(immersed.grid, immersed.viscosity, threads, alpha=alpha, transform=shared)
+                solver = stokes.StokesSolve(self.grid, immersed.viscosity, threads, alpha=alpha, transform=shared)
             else:
-                solver = TorqueStokesSolve(immersed.grid, immersed.viscosity, threads, alpha, shared)
+                solver = TorqueStokesSolve(self.grid, immersed.viscosity, threads, alpha, shared)
             if method == "krylov":
                 return stokes.StokesByKrylov(immersed, solver, factor_cost, alpha)
             return stokes.StokesByFFT(immersed, solver, alpha)
 
         background = None
         if immersed.flow is not None:
-            background = Background(immersed.grid, immersed.flow, flow_parts(self.case), threads)
+            background = Background(self.grid, immersed.flow, flow_parts(self.case), threads)
         return NavierStokes(immersed, self.density, operator, workspace, background)
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:

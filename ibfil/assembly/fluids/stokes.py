@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .on_grid import FIELDS, GridModel
+from .immersed import FIELDS
+from .on_grid import GridModel
 
 if TYPE_CHECKING:
     from ...fluids.base import Fluid

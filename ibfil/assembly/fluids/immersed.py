@@ -1,0 +1,204 @@
+"""The common part of the models of fluids that nodes push through a discrete delta kernel, whatever space they fill."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import costs
+from .. import grid as grids
+from ..drag import drag
+from . import grid_warnings
+from .base import FluidModel, Term
+
+if TYPE_CHECKING:
+    from ...case.filament import Filament
+    from ...fluids.base import Fluid
+    from ...fluids.immersed_boundary import Immersed
+    from ...fluids.spaces.base import Space
+    from ...grid.kernels import Kernel
+    from ..stacked import RodStack
+    from .base import Scene
+
+FIELDS = "fields and their transforms"
+BAND = "band matrix"
+
+
+class ImmersedModel(FluidModel):
+    """A fluid that nodes push through a discrete delta kernel."""
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The discrete delta kernel."""
+        return grids.kernel(self.case)
+
+    @property
+    def components(self) -> int:
+        """How many numbers of a node go through the fluid: 3, or 4 with its twist torque."""
+        return 4 if self.case.couples_torque else 3
+
+    @property
+    @abstractmethod
+    def space(self) -> Space:
+        """The space it fills. Raises CaseError where that cannot be made."""
+
+    # -- the fluid itself
+
+    @abstractmethod
+    def fluid(self, rods: RodStack, immersed: Immersed, method: str) -> Fluid:
+        """The fluid by one of its methods."""
+
+    def build(self, rods: RodStack) -> Fluid:
+        """The fluid by the method of the case, or the one that counts say is cheapest."""
+        return self.fluid(rods, self.immersed(rods), self.method(rods))
+
+    def immersed(self, rods: RodStack) -> Immersed:
+        """The ingredients of every fluid in this space."""
+        from ...fluids import immersed_boundary
+
+        case, space, eta = self.case, self.space, self.case.fluid.viscosity
+        volume = rods.system.mesh.volume
+        slip = immersed_boundary.slip_mobility(case.fluid.slip, self.kernel, space.spacing, eta, volume)
+        local = rods.system.unknowns == 4 and not case.couples_torque
+        spin = drag(case, rods).spin if local else None
+        number = np.float32 if case.fluid.single else np.float64
+        coupling = grids.coupling(case, rods)
+        return immersed_boundary.Immersed(space, self.kernel, eta, slip, spin, self.flow, rods.nodes, number, coupling)
+
+    def method(self, rods: RodStack) -> str:
+        """The case's, or the cheapest by counts."""
+        if self.case.fluid.method != "auto":
+            return self.case.fluid.method
+        seconds = self.seconds(rods)
+        return min(seconds, key=lambda name: seconds[name])
+
+    def transforms(self, rods: RodStack) -> bool:
+        """All methods but the table do."""
+        return self.method(rods) != "table"
+
+    # -- what a step costs
+
+    @abstractmethod
+    def evaluation(self, rods: RodStack) -> float:
+        """Seconds of one evaluation of the velocity at nodes by the cheaper transforms, from counts."""
+
+    @abstractmethod
+    def field_evaluation(self) -> float:
+        """Seconds of one evaluation of a field for output, from counts."""
+
+    @abstractmethod
+    def table_entries(self) -> float:
+        """Numbers of the mobility table."""
+
+    def factor_cost(self, rods: RodStack) -> float:
+        """The cost of factoring the rods' own systems, in velocity evaluations."""
+        factors = sum(costs.factored(where.stop - where.start, self.components) for where in rods.nodes)
+        return factors / self.evaluation(rods)
+
+    def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
+        """The flow between nodes, and what is written of it."""
+        used = {name: size for name, size in memory.items() if name not in (BAND, FIELDS)}
+        seconds = self.seconds(rods)[self.method(rods)] - costs.of_rods(self.case, len(rods.s))
+        flow = self._flow_terms(rods, seconds, used)
+        fields = memory.get(FIELDS, 0.0)
+        if self.case.output.grid_every is None:
+            flow[0] = flow[0]._replace(bytes=flow[0].bytes + fields)
+        return [*flow, *self._put_out(fields, step)]
+
+    def _flow_terms(self, rods: RodStack, seconds: float, used: Mapping[str, float]) -> list[Term]:
+        torques = ", torques too" if self.case.couples_torque else ""
+        return [Term(f"flow between nodes{torques} ({self.method(rods)})", seconds, sum(used.values()))]
+
+    def _put_out(self, fields: float, step: float) -> list[Term]:
+        """Fields and dissipation that outputs ask for, spread over the steps between them."""
+        case, out = self.case, []
+        if case.output.grid_every is not None:
+            seconds = len(case.output.fields) * self.field_evaluation() * step / case.output.grid_every
+            out.append(Term("fields written", seconds, fields))
+        if case.dissipation_observed:
+            every = case.output.every or case.time.end / max(len(case.output.times or ()), 1)
+            seconds, workspace = self._dissipation()
+            out.append(Term("dissipation looked at", seconds * step / every, 0.0 if fields else workspace))
+        return out
+
+    @abstractmethod
+    def _dissipation(self) -> tuple[float, float]:
+        """Seconds, from counts, and bytes of one look at the dissipation."""
+
+    @property
+    def _number(self) -> float:
+        """Bytes of a number of tables and of fields with inertia."""
+        return 4.0 if self.case.fluid.single else 8.0
+
+    def memory(self, rods: RodStack) -> dict[str, float]:
+        """The mobility table, and what solves with it."""
+        n, m, method = len(rods.s), rods.system.unknowns, self.method(rods)
+        out = {"mobility table": self._number * self.table_entries()}
+        if method == "krylov":
+            band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
+            out["preconditioner"] = (
+                sum(8.0 * (self.components * (w.stop - w.start)) ** 2 for w in rods.nodes) + 2 * band
+            )
+            out["Krylov vectors"] = 60 * 8.0 * self.components * n
+        else:
+            out["dense matrices"] = costs.dense_bytes(n, self.components)
+        return out
+
+    # -- what is told
+
+    def drag(self, filament: Filament) -> float:
+        """4 pi eta, whatever the grid."""
+        return 4 * np.pi * self.case.fluid.viscosity
+
+    def modelled(self) -> list[str]:
+        """Slip, and how rods spin."""
+        out = []
+        if self.case.fluid.slip:
+            out.append(f"slip mobility of {self.case.fluid.slip:g} of a point's own, against locking")
+        if self.case.couples_torque:
+            out.append(
+                "twist torques stir the grid as half a curl, rods spin with half its vorticity (rotation = grid)"
+            )
+        elif self.case.twists:
+            out.append("spin against the rod's own drag (rotation = local)")
+        return out
+
+    def absent(self) -> list[str]:
+        """Torque coupling, where it is not asked for."""
+        return [] if self.case.couples_torque else ["torque coupling of the spin to the grid"]
+
+    def size(self) -> list[str]:
+        """How thick rods and nodes are on the grid."""
+        h, kernel = self.space.spacing, self.kernel
+        return [
+            f"a rod on it is as thick as its kernel: radius {kernel.line_radius * h:.4g} when dragged, "
+            f"{grids.twist_radius(self.case):.4g} when spun by the grid; no one radius of RFT has both",
+            f"kernel {self.case.fluid.kernel}: one node moves as a sphere of radius {kernel.point_radius * h:.4g}; its "
+            f"mobility differs by {kernel.translation_error:.2g} of itself between places in a cell",
+        ]
+
+    def groups(self, filament: Filament, rate: float) -> dict[str, float]:
+        """Nodes, radii and waves in units of cells."""
+        h, length = self.space.spacing, filament.length
+        out = {"ds/h": length / (filament.nodes - 1) / h, "a/L": self.kernel.line_radius * h / length}
+        if filament.twisting is not None and self.case.couples_torque:
+            out["a/L when spun"] = grid_warnings.spun_radius(filament, grids.twist_radius(self.case)) / length
+        wave = grid_warnings.wave_number(filament)
+        if wave:
+            out["wavelength/h"] = 2 * np.pi / wave / h
+        return out
+
+    def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
+        """Nodes and waves that the grid cannot tell apart, rods that it cannot spin."""
+        return [*grid_warnings.of_nodes(self.case, name, groups), *grid_warnings.of_spin(self.case, name)]
+
+    # -- pictures and recorded runs
+
+    @property
+    def line_radius(self) -> float:
+        """That of the kernel."""
+        return self.kernel.line_radius * self.space.spacing
