@@ -90,6 +90,12 @@ class Stepper(Protocol):
     def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """From ``state`` to ``state.time + dt``. Raises NotConverged."""
 
+    def amplification(self, z: np.ndarray) -> np.ndarray:
+        """The factor by which a step of length dt takes a mode exp(lam t), z = lam dt; no number where none is known.
+
+        So the growth and the frequency that a run shows are the logarithm of it over dt.
+        """
+
 
 def _finish(
     system: System, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Solution, count: int, response

@@ -119,3 +119,7 @@ class Trapezoid:
         y = 2 * half.move
         new = State(state.time + dt, system.move(state.configuration, y), y, dt)
         return Step(new, y / dt, half.force - kicks, half.reaction, 1, response)
+
+    def amplification(self, z: np.ndarray) -> np.ndarray:
+        """The factor by which a step takes a mode exp(lam t), z = lam dt: that of the trapezoid."""
+        return (1.0 + 0.5 * z) / (1.0 - 0.5 * z)

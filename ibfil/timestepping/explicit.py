@@ -23,3 +23,7 @@ class Explicit:
         response = fluid.response(state.configuration.r, state.configuration.e3, state.time, dt)
         answer = response.forced(force, system.held(state.time, state.time + dt), target)
         return _finish(system, state, dt, answer.move, answer.move / dt, answer, 0, response)
+
+    def amplification(self, z: np.ndarray) -> np.ndarray:
+        """The factor by which a step takes a mode exp(lam t), z = lam dt: 1 + z."""
+        return 1.0 + z

@@ -90,6 +90,15 @@ class Implicit:
         y, answer, count = self._solve(equation, ahead, there)
         return _finish(system, state, dt, y, (y - target) / tau, answer, count, equation.response)
 
+    def amplification(self, z: np.ndarray) -> np.ndarray:
+        """The factor by which an even step takes a mode exp(lam t), z = lam dt: of BDF2 that of the larger root."""
+        if self.order == 1:
+            return 1.0 / (1.0 - z)
+        # (3/2 - z) g^2 - 2 g + 1/2 = 0
+        root = np.sqrt(1.0 + 2.0 * np.asarray(z, complex))
+        both = (2.0 + root) / (3.0 - 2.0 * z), (2.0 - root) / (3.0 - 2.0 * z)
+        return np.where(np.abs(both[0]) >= np.abs(both[1]), *both)
+
     def _solve(self, equation: _Equation, ahead: np.ndarray, there: Configuration) -> tuple[np.ndarray, Solution, int]:
         """Newton from wherever it converges; ``ahead`` are the extrapolated displacements, to ``there``."""
         if ahead.any():

@@ -28,3 +28,7 @@ class SemiImplicit:
         response = fluid.response(state.configuration.r, state.configuration.e3, after, dt)
         answer = response.implicit(force, matrix, system.held(state.time, after), zero, zero)
         return _finish(system, state, dt, answer.move, answer.move / dt, answer, 1, response)
+
+    def amplification(self, z: np.ndarray) -> np.ndarray:
+        """No number: what is left out of the matrix under compression is not told by the eigenvalue alone."""
+        return np.full(np.shape(z), np.nan + 0j)
