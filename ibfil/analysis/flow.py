@@ -8,6 +8,7 @@ import numpy as np
 
 from ..assembly.fluids.models import fluid_model
 from ..assembly.grid import kernel
+from ..assembly.wrapped import recorded_thickness
 from ..errors import CaseError
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ class FlowOfForces:
     def __init__(self, run: RunFile, fluid: FluidModel) -> None:
         self._run, self._background, self._solve = run, fluid.flow, fluid.solve_for_flow()
         self._kernel = kernel(run.case)
+        rods = [(run.filament(name), run.arclength(name)) for name in run.filaments]
+        self._thickness = recorded_thickness(fluid, rods)
 
     def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:
         """One FFT there and back, and an interpolation with the run's kernel."""
@@ -62,14 +65,17 @@ class FlowOfForces:
         return self._kernel.stencil(self._solve.grid.coordinates(r))
 
     def _pushes(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and forces (n, 3) of all nodes, linear between the outputs about ``time``."""
+        """Positions of all nodes, and what they push with (n, 3), linear between the outputs about ``time``."""
         i, part = between(self._run.time, time, str(self._run.path))
-        both = []
-        for key in ("position", "force"):
-            parts = [columns[key][i : i + 2] for columns in self._run.filaments.values()]
-            two = np.concatenate(parts, axis=1)
-            both.append(np.ascontiguousarray((1.0 - part) * two[0] + part * two[-1]))
-        return both[0], both[1]
+
+        def taken(key: str) -> np.ndarray:
+            two = np.concatenate([columns[key][i : i + 2] for columns in self._run.filaments.values()], axis=1)
+            return np.ascontiguousarray((1.0 - part) * two[0] + part * two[-1])
+
+        r, force = taken("position"), taken("force")
+        if self._thickness is None:
+            return r, force
+        return r, force + self._thickness.at(r, time).from_fluid(taken("velocity"))
 
 
 class FlowOfField:

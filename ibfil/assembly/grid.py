@@ -78,13 +78,12 @@ def coupling(case: Case, stacked: RodStack) -> Coupling:
         return TRANSLATION
     from ..fluids.torque_coupling import TorqueCoupling, spin_mobility
 
-    n, volume = len(stacked.s), stacked.system.mesh.volume
+    volume, twists = stacked.system.mesh.volume, stacked.twists
     widest = twist_radius(case)
-    radius, twists = np.full(n, widest), np.zeros(n)
+    radius = np.full(len(volume), widest)
     for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
-        twists[where] = filament.twisting is not None
         if filament.radius is not None:
             radius[where] = alone(filament.radius, stacked.s[where])
     spin = spin_mobility(radius, widest, case.fluid.slip, case.fluid.viscosity, volume)
     # Where a filament does not twist its turn is held; any positive number will do for the row.
-    return TorqueCoupling(np.where(twists > 0, spin, 1.0), twists)
+    return TorqueCoupling(np.where(twists, spin, 1.0), twists.astype(float))

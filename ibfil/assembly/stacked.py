@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,11 @@ class RodStack:
     system: RodSystem
     start: Configuration
     contact: Contact | NoContact
+
+    @cached_property
+    def twists(self) -> np.ndarray:
+        """Which nodes are of filaments that twist (n,): e1 of others may come to differ from node to node."""
+        return np.repeat([f.twisting is not None for f in self.filaments], [w.stop - w.start for w in self.nodes])
 
     def locate(self, node: int) -> tuple[str, int]:
         """The filament that a node of the stack is of, and its number there."""

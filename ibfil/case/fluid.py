@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field
+from pydantic import Discriminator, Field, Strict
 
 from .table import Table
 from .values import (
@@ -39,6 +39,12 @@ class Coefficients(Table):
     spin: Positive | None = Field(None, description="torque per length and rate of spin")
 
 
+class Thick(Table):
+    """Rods that turn in a shear as spheroids of a given aspect ratio."""
+
+    aspect: Positive = Field(description="effective aspect ratio r_e > 1 of each rod when straight", examples=[20.0])
+
+
 def _drag(value: object) -> str:
     """Which member of the union of drags a value is meant to be."""
     if isinstance(value, dict):
@@ -61,6 +67,14 @@ class Fluid(Table):
         | Annotated[Coefficients, tagged("coefficients")],
         Discriminator(_drag),
     ] = Field("paper", description="rft: 4 pi eta, 2 pi eta | slender body | matched to the grid | given")
+    thick: Annotated[
+        Annotated[bool, Strict(), tagged("word")] | Annotated[Thick, tagged("table")],
+        Discriminator(lambda value: "<table>" if isinstance(value, dict | Thick) else "<word>"),
+    ] = Field(
+        False,
+        description="whether flows turn rods by their thickness too (Jeffery orbits): by their radius, on a grid the "
+        "kernel's where none is given; rft: or by an aspect ratio",
+    )
     box: Sizes | None = Field(None, description="periodic box, required by grid fluids")
     cells: Cells | None = Field(None, description="cells along x, y, z, one h on all axes; or thickness")
     thickness: Positive | None = Field(None, description="hydrodynamic line radius that chooses the cells")
@@ -90,6 +104,11 @@ class Fluid(Table):
     def couples_torque(self) -> bool:
         """Whether twist torques of rods that twist act on the fluid, and its vorticity turns them."""
         return self.on_grid and self.rotation == "grid"
+
+    @property
+    def aspect(self) -> float | None:
+        """The effective aspect ratio of rods whose thickness is given by it; None: by their radius, or not at all."""
+        return self.thick.aspect if isinstance(self.thick, Thick) else None
 
     @property
     def single(self) -> bool:

@@ -2,7 +2,8 @@
 
 Only what a case names is counted, because only that is built. Shares of time are of one step, outputs spread over the
 steps between them; that of the rods and of the fluid are those by which the method is chosen (assembly/costs.py), the
-rest was measured against them: twisting 0.7 of what bending and stretching take, contact 1.5, noise 0.1.
+rest was measured against them: twisting 0.7 of what bending and stretching take, contact 1.5, noise 0.1, the couple
+across the thickness 0.5.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
 _TWISTING = 0.7  # of the step of bending and stretching
-_CONTACT, _NOISE = 1.5, 0.1  # the same of an implicit one
+_CONTACT, _NOISE, _COUPLE = 1.5, 0.1, 0.5  # the same of an implicit one
+OWN = "forces by velocity"
 
 
 def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
@@ -34,7 +36,10 @@ def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
         out.append(Term("contact", _CONTACT * implicit, 8.0 * 30 * n))
     if case.thermal is not None:
         out.append(Term("thermal noise", _NOISE * implicit, 8.0 * unknowns * n))
-    return out + simulation.model.fluid_model.terms(simulation.rods, memory, simulation.step_length)
+    if simulation.model.thickness is not None:
+        out.append(Term("couple across the thickness", _COUPLE * implicit, memory[OWN]))
+    rest = {name: size for name, size in memory.items() if name != OWN}
+    return out + simulation.model.fluid_model.terms(simulation.rods, rest, simulation.step_length)
 
 
 def shares(found: list[Term]) -> list[tuple[str, float, float]]:
@@ -47,7 +52,8 @@ def memory(simulation: Simulation) -> dict[str, float]:
     """Bytes of the large arrays, by what they are for."""
     n, m = len(simulation.arclength), simulation.system.unknowns
     band = 8.0 * n * m * m * (2 * simulation.system.profile.width + 1)
-    return {BAND: band, **simulation.model.fluid_model.memory(simulation.rods)}
+    own = {} if simulation.model.fluid is simulation.model.inner else {OWN: 2 * band}
+    return {BAND: band, **simulation.model.fluid_model.memory(simulation.rods), **own}
 
 
 def disk(simulation: Simulation) -> float:

@@ -30,11 +30,20 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
     return out | simulation.model.fluid_model.groups(filament, rate)
 
 
+def _in_shear(simulation: Simulation, name: str) -> dict[str, float]:
+    """The effective aspect ratio of a straight filament that is thick, and its period in a shear."""
+    ratio = simulation.model.aspect_ratios.get(name)
+    if ratio is None:
+        return {}
+    return {"r_e, effective aspect ratio": ratio, "shear x period of a turn": 2 * np.pi * (ratio + 1 / ratio)}
+
+
 def groups(simulation: Simulation) -> dict[str, float]:
     """The dimensionless groups of the scene; with several filaments each name begins with the filament's."""
     filaments = simulation.case.filaments
     out: dict[str, float] = {}
     for name, filament in filaments.items():
         prefix = "" if len(filaments) == 1 else f"{name}: "
-        out.update({prefix + key: value for key, value in of_filament(simulation, filament).items()})
+        found = of_filament(simulation, filament) | _in_shear(simulation, name)
+        out.update({prefix + key: value for key, value in found.items()})
     return out

@@ -59,8 +59,11 @@ def modelled(case: Case) -> list[str]:
         terms += [row.words for row in named(ALONG, f.loads)]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     if case.fluid.flow is not None:
-        spins = "spins them by half its vorticity" if case.couples_torque else "does not spin them"
-        out.append(f"a background flow, which moves the nodes and {spins}")
+        spins = ", and spins those that twist by half its vorticity about the tangent" if case.twists else ""
+        out.append(f"a background flow, which moves the nodes{spins}")
+    if case.fluid.thick:
+        by = "their radius" if case.fluid.aspect is None else f"an aspect ratio of {case.fluid.aspect:g} when straight"
+        out.append(f"the couple of flows across the rods' thickness, by {by}: straight ones tumble in a shear")
     if case.contact is not None:
         out.append(_contact(case.contact))
     out += fluid_model(case).modelled()
@@ -89,7 +92,7 @@ def absent(case: Case) -> list[str]:
     if not case.twists:
         out.append("twist: no twist unknowns; e1 is carried along")
     out += fluid.absent()
-    if case.fluid.flow is not None:
+    if case.fluid.flow is not None and not case.fluid.thick:
         out.append("the flow's couple across a rod's thickness: a straight one turns towards a shear, never past it")
     if case.output.grid_every is None:
         out.append("field output")
@@ -154,6 +157,8 @@ def _steps(simulation: Simulation) -> list[str]:
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
         *simulation.model.fluid_model.step_lines(),
     ]
+    if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
+        lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
     rates = simulation.driving_rates()
     if rates and max(rates) > 0:
         lines.append(f"shortest period of what drives the rods: {2 * np.pi / max(rates):.4g}")

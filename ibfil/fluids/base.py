@@ -35,14 +35,15 @@ class Solution(NamedTuple):
     """A fluid's solution, each (n, m): the displacement, the force on the fluid, the reactions within that."""
 
     move: np.ndarray
-    force: np.ndarray  # elastic force and loads as they acted over the step, reactions included
+    force: np.ndarray  # elastic force and loads as they acted over the step, inertia and reactions included
     reaction: np.ndarray  # of the supports on the rod, zero where nothing is held
 
 
 class Response(Protocol):
     """A fluid at frozen positions, over a step whose effective length is tau (units of time).
 
-    ``keeps``: ``implicit`` does not overwrite the stiffness, and given the same array again uses its factors again.
+    ``keeps``: ``implicit`` does not overwrite the stiffness, and given the same array again, the same unknowns being
+    held, uses its factors again.
     """
 
     keeps: bool
@@ -66,8 +67,11 @@ class Fluid(Protocol):
         tau = dt: a fluid that remembers discretises its own past likewise. Asking changes nothing that it remembers.
         """
 
-    def advance(self, response: Response, force: np.ndarray) -> None:
-        """The step that ``response``, the last one asked for, belongs to is taken: forces (n, m) acted over it."""
+    def advance(self, response: Response, velocity: np.ndarray, force: np.ndarray) -> None:
+        """The step that ``response``, the last one asked for, belongs to is taken.
+
+        The nodes moved with ``velocity`` (n, m), and forces (n, m) acted over it.
+        """
 
     def longest_step(self) -> float:
         """The longest step that the fluid's own motion allows now (units of time); infinite where it has none."""
@@ -87,7 +91,7 @@ class Fluid(Protocol):
 class Memoryless:
     """A fluid whose response depends on the present only."""
 
-    def advance(self, response: Response, force: np.ndarray) -> None:
+    def advance(self, response: Response, velocity: np.ndarray, force: np.ndarray) -> None:
         """Nothing."""
 
     def longest_step(self) -> float:

@@ -22,7 +22,10 @@ from ..linalg.constraints import Prescribed
 
 
 class Newton(NamedTuple):
-    """One linearised statement (base.py): forces (n, m), their stiffness by bands, what is held, y, target, tau."""
+    """One linearised statement (base.py): forces (n, m), their stiffness by bands, what is held, y, target, tau.
+
+    Where a background flow carries the nodes ``target`` is target + tau u0.
+    """
 
     force: np.ndarray
     stiffness: np.ndarray

@@ -15,7 +15,7 @@ from ..grid.periodic_grid import Grid
 from ..grid.spectral import half_curl, project
 from ..grid.spreading import interpolate, spread
 from .base import Flow
-from .torque_coupling import curl
+from .velocity_gradient import curl
 
 
 class GridFields:

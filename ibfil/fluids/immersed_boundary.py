@@ -24,16 +24,18 @@ from .base import Flow, Solution
 from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
 from .coupling import TRANSLATION, Coupling, Nodes
 from .spaces.base import Mobility, Space
+from .velocity_gradient import advected
 
 
 @dataclass(frozen=True)
 class Immersed:
     """The ingredients of an immersed-boundary fluid: space, kernel, eta, slip (n,), drag against spin (n,), flow.
 
-    The drag against spin is None where nothing twists, or where twist torques go through the grid. ``filaments`` are
-    the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is the type of the
-    mobility table's numbers and of the fields of a fluid with inertia, double or single precision (relative error about
-    1e-7).
+    The drag against spin is None where nothing twists, or where twist torques go through the grid. ``twists`` (n,) is
+    one where a background flow turns nodes against that drag, zero at those of rods that do not twist. ``filaments``
+    are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is the type of
+    the mobility table's numbers and of the fields of a fluid with inertia, double or single precision (relative error
+    about 1e-7).
     """
 
     space: Space
@@ -42,6 +44,7 @@ class Immersed:
     slip: np.ndarray
     spin_drag: np.ndarray | None
     flow: Flow | None = None
+    twists: np.ndarray | None = None
     filaments: tuple[slice, ...] = ()
     number: type = np.float64
     coupling: Coupling = TRANSLATION
@@ -65,10 +68,12 @@ class Immersed:
         return Nodes(*self.stencil(r), self.coupling.axes(e3))
 
     def advected(self, nodes: Nodes, r: np.ndarray, time: float) -> np.ndarray | None:
-        """The motions (n, c) with which the background flow carries nodes at r (n, 3); None where there is none."""
+        """The motions (n, m) with which the background flow carries nodes at r (n, 3); None where there is none."""
         if self.flow is None:
             return None
-        return self.coupling.advected(self.flow, r, nodes.axes, time, self.space.spacing)
+        if self.spin_drag is None or self.twists is None:
+            return self.coupling.advected(self.flow, r, nodes.axes, time, self.space.spacing)
+        return advected(self.flow, r, self.twists[:, None] * nodes.axes, time, self.space.spacing)
 
     def mobility(self, alpha: float = 0.0) -> Mobility:
         """The exact mobility of nodes, without their own; alpha is density over time, zero in Stokes flow."""
@@ -93,7 +98,7 @@ class ImmersedResponse(ABC):
     keeps = False
 
     def __init__(self, immersed: Immersed, nodes: Nodes, flow: np.ndarray | None, tau: float) -> None:
-        """``flow`` (n, c) are the motions that nodes have without any force, None where they have none."""
+        """``flow`` (n, c) or (n, m) are the motions that nodes have without any force, None where they have none."""
         self.immersed, self.nodes, self.flow, self.tau = immersed, nodes, flow, tau
         self.components = immersed.coupling.components
 
@@ -109,15 +114,19 @@ class ImmersedResponse(ABC):
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         """x (c n,) with (1 - tau M K) x = right; at held unknowns columns of -tau M: forces are sought."""
 
-    def _base(self, target: np.ndarray) -> np.ndarray:
-        base = target[:, : self.components]
-        return base.ravel() if self.flow is None else (base + self.tau * self.flow).ravel()
+    def _carried(self, target: np.ndarray) -> np.ndarray:
+        """The displacements (n, m) without any force: target + tau u0."""
+        if self.flow is None:
+            return target
+        out = target.copy()
+        out[:, : self.flow.shape[1]] += self.tau * self.flow
+        return out
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """y = target + tau (u0 + M (force + R)), R such that held unknowns move as prescribed."""
         condensation, (n, m), c = self.immersed.condensation, force.shape, self.components
-        reaction = np.zeros((n, m))
-        move = self._base(target) + self.tau * self.apply(np.ascontiguousarray(force[:, :c]).ravel())
+        reaction, base = np.zeros((n, m)), self._carried(target)
+        move = base[:, :c].ravel() + self.tau * self.apply(np.ascontiguousarray(force[:, :c]).ravel())
         here, index = condensation.held_in_fluid(held, m)
         if index.size:
             columns = self.columns(index)
@@ -126,27 +135,27 @@ class ImmersedResponse(ABC):
             reaction[index // c, index % c] = push
         y = np.zeros((n, m))
         y[:, :c] = move.reshape(n, c)
-        condensation.move_rest(y, force, target, self.tau)
+        condensation.move_rest(y, force, base, self.tau)
         y.ravel()[held.at] = held.value
-        reaction += condensation.react_rest(y, target, force, held, self.tau)
+        reaction += condensation.react_rest(y, base, force, held, self.tau)
         return Solution(y, force + reaction, reaction)
 
     def implicit(
         self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
-        condensation, c = self.immersed.condensation, self.components
-        statement = condensation.reduced(Newton(force, stiffness, held, y, target, self.tau))
+        condensation, c, base = self.immersed.condensation, self.components, self._carried(target)
+        statement = condensation.reduced(Newton(force, stiffness, held, y, base, self.tau))
         index = statement.index
         known = np.zeros(statement.force.size)
         known[index] = statement.value
         push = statement.force + statement.times(known) if index.size else statement.force
-        right = self._base(target) - y[:, :c].ravel() + self.tau * self.apply(push) - known
+        right = (base - y)[:, :c].ravel() + self.tau * self.apply(push) - known
         x = self.solve(statement, right)
         d, reaction = x.copy(), np.zeros(force.shape)
         d[index] = statement.value
         reaction[index // c, index % c] = x[index]
         move = statement.whole(d)
         felt = force + banded.multiply(stiffness, move)
-        reaction += condensation.react_rest(y + move, target, felt, held, self.tau)
+        reaction += condensation.react_rest(y + move, base, felt, held, self.tau)
         return Solution(move, felt + reaction, reaction)

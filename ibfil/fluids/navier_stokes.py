@@ -117,11 +117,13 @@ class NavierStokes:
         nodes, past = self.immersed.nodes(r, e3), weights(alpha, tau, w, self.history.dt_old)
         felt = self.workspace.gather(nodes, partial(self.history.predict, past))
         u0, flow = self.immersed.coupling.from_grid(nodes.axes, felt), self.immersed.advected(nodes, r, time)
-        response = operator.respond(nodes, u0 if flow is None else flow + u0, tau)
+        if flow is not None:
+            u0 = np.column_stack([u0 + flow[:, : u0.shape[1]], flow[:, u0.shape[1] :]])
+        response = operator.respond(nodes, u0, tau)
         self._asked = _Asked(response, past)
         return response
 
-    def advance(self, response: Response, force: np.ndarray) -> None:
+    def advance(self, response: Response, velocity: np.ndarray, force: np.ndarray) -> None:
         """The velocity at the end of the step, and its advection. Raises ValueError for a step not asked for last."""
         if self._asked is None or response is not self._asked.response:
             raise ValueError("a step that is taken must be the one the fluid was asked for last")

@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from ..rods.geometry import Configuration
-from .base import Flow
 from .coupling import Nodes
 from .fields import GridFields
 from .immersed_boundary import Immersed
+from .resistive_force import ResistiveForce
 
 
 class FluidOutput(Protocol):
@@ -31,15 +31,16 @@ class FluidOutput(Protocol):
 class DragOutput:
     """Of resistive-force theory: the heat of drag."""
 
-    def __init__(self, flow: Flow | None) -> None:
-        self._flow = flow
+    def __init__(self, fluid: ResistiveForce) -> None:
+        self._fluid = fluid
 
     def dissipation(
         self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
     ) -> dict[str, float | np.ndarray]:
         """F.(u - u0): what the rods do, less what they only hand on from the background flow."""
-        carried = 0.0 if self._flow is None else float(np.sum(force[:, :3] * self._flow(configuration.r, time)))
-        return {"dissipation": float(np.sum(velocity * force)) - carried}
+        carried = self._fluid.advected(configuration.r, configuration.e3, time)
+        handed_on = 0.0 if carried is None else float(np.sum(force * carried))
+        return {"dissipation": float(np.sum(velocity * force)) - handed_on}
 
     def evaluate(
         self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]

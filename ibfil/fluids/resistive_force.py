@@ -2,7 +2,8 @@
 
     Z_i = Lc [ zeta_perp (1 - e3 e3) + zeta_par e3 e3 ],   and Lc zeta_r for the spin:   Z (u - u0) = F
 
-M = Z^-1, so the implicit step is multiplied by Z and stays banded: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f.
+u0 is the background flow, and half its curl about the tangent. M = Z^-1, so the implicit step is multiplied by Z and
+stays banded: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from ..linalg.vectors import at, dot, mix, put
 from .base import Flow, Memoryless, Solution
+from .velocity_gradient import advected
 
 
 class Drag(NamedTuple):
@@ -97,15 +99,12 @@ class _Response:
     ) -> None:
         self.drag, self.profile, self.e3, self.flow, self.tau = drag, profile, e3, flow, tau
 
-    def _velocity_target(self, target: np.ndarray) -> np.ndarray:
-        if self.flow is None:
-            return target
-        base = target.copy()
-        base[:, :3] += self.tau * self.flow
-        return base
+    def _carried(self, target: np.ndarray) -> np.ndarray:
+        """The displacements (n, m) without any force: target + tau u0."""
+        return target if self.flow is None else target + self.tau * self.flow
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
-        base = self._velocity_target(target)
+        base = self._carried(target)
         y = base + self.tau * mobilize(self.drag, self.e3, force)
         y.ravel()[held.at] = held.value
         felt = resist(self.drag, self.e3, (y - base) / self.tau)
@@ -115,7 +114,7 @@ class _Response:
         self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         """(K - Z/tau) d = Z/tau (y - target) - Z u0 - f; uses ``stiffness`` up."""
-        base = self._velocity_target(target)
+        base = self._carried(target)
         moved, m, inverse = y - base, force.shape[1], 1.0 / self.tau
         nodes = np.unique(held.at // m) if held.at.size else held.at
         rows = stiffness[nodes] if nodes.size else stiffness[:0]
@@ -155,15 +154,29 @@ class ResistiveForce(Memoryless):
     """The RFT fluid.
 
     ``drag`` holds the coefficients times the control volumes, ``profile`` where the rods' matrices are not zero;
-    ``flow(r, t)`` the background velocity (n, 3) at the nodes, or None (Eq. 48).
+    ``flow(r, t)`` the background velocity (n, 3) at the nodes, or None (Eq. 48); ``twists`` (n,) is one at nodes that
+    the flow turns and zero at others, None where none has a turn; ``spacing`` is that of the nodes.
     """
 
-    def __init__(self, drag: Drag, profile: banded.Profile, flow: Flow | None = None) -> None:
-        self.drag, self.profile, self.flow = drag, profile, flow
+    def __init__(
+        self,
+        drag: Drag,
+        profile: banded.Profile,
+        flow: Flow | None = None,
+        twists: np.ndarray | None = None,
+        spacing: float = 1.0,
+    ) -> None:
+        self.drag, self.profile, self.flow, self.twists, self.spacing = drag, profile, flow, twists, spacing
+
+    def advected(self, r: np.ndarray, e3: np.ndarray, time: float) -> np.ndarray | None:
+        """The motions (n, m) with which the background flow carries nodes; None where there is none."""
+        if self.flow is None:
+            return None
+        return advected(self.flow, r, None if self.twists is None else self.twists[:, None] * e3, time, self.spacing)
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Response:
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
-        return _Response(self.drag, self.profile, e3, None if self.flow is None else self.flow(r, time), tau)
+        return _Response(self.drag, self.profile, e3, self.advected(r, e3, time), tau)
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float

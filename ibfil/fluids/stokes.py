@@ -132,7 +132,7 @@ class Tabulated(Memoryless, ABC):
 
     @abstractmethod
     def respond(self, nodes: Nodes, flow: np.ndarray | None, tau: float) -> ImmersedResponse:
-        """The mobility of nodes that ``flow`` (n, c) carries along, None where nothing does."""
+        """The mobility of nodes that ``flow`` (n, c) or (n, m) carries along, None where nothing does."""
 
     def matrix(self, nodes: Nodes, own: np.ndarray) -> np.ndarray:
         """The exact mobility (c n, c n) of nodes, with ``own`` (n, c) on its diagonal."""

@@ -41,6 +41,7 @@ from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol, half_curl, project
 from ..grid.spreading import interpolate, spread
 from .mobility_table import COMPONENTS, Octant, point_response, sum_pair
+from .velocity_gradient import advected
 
 if TYPE_CHECKING:
     from .coupling import Nodes
@@ -239,11 +240,4 @@ class TorqueCoupling:
         self, flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, axes: np.ndarray, time: float, h: float
     ) -> np.ndarray:
         """The flow's velocity and its spin about the tangents, (n, 4)."""
-        return self.from_grid(axes, np.hstack([flow(r, time), 0.5 * curl(flow, r, time, h)]))
-
-
-def curl(flow: Callable[[np.ndarray, float], np.ndarray], r: np.ndarray, time: float, h: float) -> np.ndarray:
-    """Curl (n, 3) of a flow at places r (n, 3), by central differences over a thousandth of the grid's spacing h."""
-    d = 1e-3 * h
-    x, y, z = ((flow(r + step, time) - flow(r - step, time)) / (2 * d) for step in d * np.eye(3))
-    return np.stack([y[:, 2] - z[:, 1], z[:, 0] - x[:, 2], x[:, 1] - y[:, 0]], axis=1)
+        return advected(flow, r, axes, time, h)

@@ -55,6 +55,7 @@ _DIAGNOSTICS = {
     "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
     "power": ("force length/time", "power of the nodal forces and twist torques on the fluid"),
     "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
+    "couple_dissipation": ("force length/time", "the part of it by the couple of flows across the rods' thickness"),
     "grid_power": ("force length/time", "power of the nodal forces upon the grid's own flow"),
     "slip_power": ("force length/time", "power lost between nodes and grid: the slip's share"),
     "contacts": ("1", "pairs of segments in contact"),

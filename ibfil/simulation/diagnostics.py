@@ -37,7 +37,7 @@ class Diagnostics:
     @cached_property
     def _output(self) -> FluidOutput:
         """The fluid's own outputs, made when they are first asked for."""
-        return self._model.fluid_model.output(self._rods, self._model.fluid)
+        return self._model.fluid_model.output(self._rods, self._model.inner)
 
     def snapshot(self, now: SolvedState, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments with diagnostics, and the ``fields`` named."""
@@ -62,7 +62,7 @@ class Diagnostics:
                 *ends,
                 **self._twisting(description, now, where),
             )
-        grid = self._output.evaluate(configuration, now.force, now.state.time, fields) if fields else None
+        grid = self._output.evaluate(configuration, self._pushed(now), now.state.time, fields) if fields else None
         return Snapshot(now.state.time, filaments, self._of_all(now), grid)
 
     def _twisting(self, filament: Filament, now: SolvedState, where: slice) -> dict[str, np.ndarray]:
@@ -71,6 +71,13 @@ class Diagnostics:
             return {}
         e3 = now.state.configuration.e3[where]
         return {"torque": now.force[where, 3:] * e3, "spin": now.velocity[where, 3:] * e3}
+
+    def _pushed(self, now: SolvedState) -> np.ndarray:
+        """All that pushes the fluid inside (n, m): the rods' force on the fluid, and what the fluid's couple adds."""
+        thickness, state = self._model.thickness, now.state
+        if thickness is None:
+            return now.force
+        return now.force + thickness.at(state.configuration.r, state.time).from_fluid(now.velocity)
 
     def _nodal_moment(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""
@@ -108,7 +115,17 @@ class Diagnostics:
         case, fluid = self._model.case, self._model.fluid
         if case.output.probes and self._model.grid is not None:
             points = np.array(case.output.probes)
-            out["probe_velocity"] = fluid.velocity_at(points, configuration.r, configuration.e3, force, now.state.time)
+            pushed = self._pushed(now)
+            out["probe_velocity"] = fluid.velocity_at(points, configuration.r, configuration.e3, pushed, now.state.time)
         if case.dissipation_observed:
-            out |= self._output.dissipation(configuration, now.velocity, force, now.state.time)
+            out |= self._dissipation(now)
         return out | self._rods.contact.diagnostics(configuration.r)
+
+    def _dissipation(self, now: SolvedState) -> dict[str, float | np.ndarray]:
+        """The heat of the fluid, that of its couple across the rods included, and what else it knows of power."""
+        state, thickness = now.state, self._model.thickness
+        out = self._output.dissipation(state.configuration, now.velocity, self._pushed(now), state.time)
+        if thickness is None:
+            return out
+        heat = thickness.at(state.configuration.r, state.time).dissipation(now.velocity)
+        return {**out, "dissipation": out["dissipation"] + heat, "couple_dissipation": heat}

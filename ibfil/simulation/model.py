@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 from ..assembly import rods as assembly_rods
 from ..assembly import scheme
 from ..assembly.fluids.models import fluid_model
+from ..assembly.wrapped import aspect_ratio, surrounding
 
 if TYPE_CHECKING:
     from ..assembly.fluids.base import FluidModel
     from ..assembly.stacked import RodStack
     from ..case.schema import Case
     from ..fluids.base import Fluid
+    from ..fluids.wrapped.thickness import Thickness
     from ..grid.periodic_grid import Grid
     from ..rods.constitutive import MomentLaw
     from ..timestepping.base import Stepper
@@ -27,13 +29,16 @@ if TYPE_CHECKING:
 class Model:
     """A scene put together. Nothing in it changes as a run goes on, but for what fluid, contact and noise remember.
 
-    ``method`` names the fluid's path.
+    ``fluid`` is what the rods move in; ``inner`` the same, or what is in it (fluids/wrapped), ``thickness`` the couple
+    across the rods, if there is one. ``method`` names the fluid's path.
     """
 
     case: Case
     rods: RodStack
     fluid_model: FluidModel
     fluid: Fluid
+    inner: Fluid
+    thickness: Thickness | None
     method: str
     noise: Noise | None
     stepper: Stepper
@@ -47,6 +52,17 @@ class Model:
         """The range of nodes of the filament of that name, or of its first copy."""
         names = self.rods.names
         return self.rods.nodes[names.index(name if name in names else f"{name}_000")]
+
+    @cached_property
+    def aspect_ratios(self) -> dict[str, float]:
+        """The effective aspect ratios of the filaments that are straight at the start, where rods are thick."""
+        if self.thickness is None:
+            return {}
+        found = {
+            name: aspect_ratio(self.fluid_model, self.rods, self.thickness, self.nodes(name))
+            for name in self.case.filaments
+        }
+        return {name: ratio for name, ratio in found.items() if ratio is not None}
 
     @cached_property
     def transforms(self) -> bool:
@@ -70,9 +86,9 @@ def assemble(case: Case, laws: Mapping[str, MomentLaw] = MappingProxyType({}), w
         from ..grid import fft
 
         fft.learn(wisdom)
-    fluid, method = described.build(rods), described.method(rods)
+    fluid, method = surrounding(described, rods), described.method(rods)
     noise = scheme.noise(case, rods)
-    model = Model(case, rods, described, fluid, method, noise, scheme.stepper(case, noise))
+    model = Model(case, rods, described, *fluid, method, noise, scheme.stepper(case, noise))
     if model.transforms:
         fft.remember()
     return model

@@ -183,7 +183,7 @@ class Simulation:
     def accept(self, step: Step, time: float) -> None:
         """Take a step, which led to ``time``. Raises RunFailed where it led out of bounds, Stopped at a contact."""
         before, self.state_now = self.state_now, step.state._replace(time=time)
-        self.fluid.advance(step.response, step.force)
+        self.fluid.advance(step.response, step.velocity, step.force)
         self._look_at_crossing(time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
         self.steps += 1
@@ -196,19 +196,13 @@ class Simulation:
 
     def _look_at_bounds(self, configuration: Configuration, dt: float) -> None:
         rods = self.system
-        found = failures.out_of_bounds(rods.mesh, self._twisting, rods.stretching, configuration)
+        found = failures.out_of_bounds(rods.mesh, self.rods.twists, rods.stretching, configuration)
         if found is not None:
             self._fail(found.trouble(self._known(dt)))
 
-    @cached_property
-    def _twisting(self) -> np.ndarray:
-        """Which nodes twist (n,): the e1 of a filament without twisting may come to differ from node to node."""
-        rods = self.model.rods
-        return np.repeat([f.twisting is not None for f in rods.filaments], [w.stop - w.start for w in rods.nodes])
-
     def _known(self, dt: float) -> failures.Step:
         """The facts of a step that failed; the limit is that of the start, where the present is not finite."""
-        limit = explicit_limit(self.system, self.fluid, self.start, 0.0) if self.case.time.explicit else np.inf
+        limit = explicit_limit(self.system, self.model.inner, self.start, 0.0) if self.case.time.explicit else np.inf
         return failures.Step(dt, limit, self.case.thermal is not None and self.case.thermal.energy > 0)
 
     def _look_at_crossing(self, dt: float) -> None:
@@ -262,8 +256,11 @@ class Simulation:
         return timescales.stretch_by_kicks(self.model, dt)
 
     def explicit_limit(self) -> float:
-        """The largest stable step of the explicit scheme at the present configuration, 2/rho(M K)."""
-        return explicit_limit(self.system, self.fluid, self.configuration, self.time)
+        """The largest stable step of the explicit scheme at the present configuration, 2/rho(M K).
+
+        Of the fluid inside: what nodes feel of their own velocity slows them, so this errs on the safe side.
+        """
+        return explicit_limit(self.system, self.model.inner, self.configuration, self.time)
 
     # -- what is looked at ---------------------------------------------------------------------------------------
 

@@ -196,7 +196,7 @@ def first_step(model: Model) -> float:
         return float(time.step)
 
     def limit() -> float:
-        return explicit_limit(rods.system, model.fluid, rods.start, 0.0)
+        return explicit_limit(rods.system, model.inner, rods.start, 0.0)
 
     if time.explicit:
         return 0.5 * limit()

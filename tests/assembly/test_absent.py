@@ -77,6 +77,14 @@ def test_no_twist_unknowns_without_twisting():
     assert twisted.state()["velocity"].shape == (9, 4)
 
 
+def test_no_fluid_around_the_fluid_where_rods_feel_nothing_of_their_velocity():
+    plain, thick = Simulation(case()), Simulation(case("fluid.thick={aspect=9}"))
+    assert plain.fluid is plain.model.inner
+    assert thick.fluid is not thick.model.inner
+    assert "forces by velocity" not in memory(plain)
+    assert "forces by velocity" in memory(thick)
+
+
 def test_no_jacobian_in_explicit_runs(monkeypatch):
     jacobians = Counter(monkeypatch, system.RodSystem, "stiffness")
     explicit = ("time.scheme=explicit", "time.step=1e-5")
@@ -133,7 +141,8 @@ def test_check_lists_each_term_with_its_share_and_no_other():
 
 def test_the_sizes_are_those_of_the_terms():
     """What `check` says of memory is shared out among them, all of it; the drag's three numbers a node come on top."""
-    for overrides in ((), GRID, (*GRID, "output.grid_every=0.005"), ("fluid.model=navier-stokes", "fluid.density=1")):
+    thick, inertia = ("fluid.thick={aspect=9}",), ("fluid.model=navier-stokes", "fluid.density=1")
+    for overrides in ((), thick, GRID, (*GRID, "output.grid_every=0.005"), inertia):
         simulation = Simulation(case(*overrides))
         listed = memory(simulation)
         drag = 0 if simulation.grid is not None else 3 * 8 * 9

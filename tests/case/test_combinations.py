@@ -116,6 +116,10 @@ COMBINATIONS = [
     ([f"{ROD}.twisting=1"], f"{ROD}.radius", "with twisting"),
     ([f"{ROD}.twisting=1", "fluid.drag={perp=2, par=1}"], f"{ROD}.radius", "with twisting"),
     # noise and time
+    (["fluid.thick=true"], f"{ROD}.radius", "with fluid.thick, a radius"),
+    (["fluid.thick={aspect=1}"], "fluid.thick.aspect", "> 1"),
+    ([*STOKES, "fluid.thick={aspect=9}"], "fluid.thick.aspect", "only with rft"),
+    ([*THERMAL, "fluid.thick={aspect=9}"], "fluid.thick", "false with [thermal]"),
     ([*THERMAL, *STOKES], "thermal", 'fluid.model = "rft"'),
     ([*THERMAL, *NAVIER], "thermal", 'fluid.model = "rft"'),
     ([*THERMAL, "thermal.twist=true"], "thermal.twist", "no filament has twisting"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ibfil import parse_case
+from ibfil.check.report import report
 from ibfil.check.warnings import warnings
 from ibfil.simulation.simulation import Simulation
 
@@ -41,6 +42,9 @@ FORCE = "fluid.box: the rods push the fluid with a net force"
         (["fluid.slip=0", "filament.rod.nodes=65"], "filament.rod: nodes are 0.5 cells apart and fluid.slip = 0"),
         (["output.every=0.2"], "output.every: 0.2 is beyond time.end = 0.1"),
         (["fluid.model=rft", "filament.rod.radius=0.3"], ""),  # a grid's matter
+        (["fluid.thick=true"], ""),
+        (["fluid.thick=true", "filament.rod.radius=0.03"], ""),  # the kernel's is 0.0346
+        (["fluid.thick=true", "filament.rod.radius=0.02"], "filament.rod.radius: 0.02 makes the couple of the flow"),
         (["filament.rod.start={end='hinged', moves=['0.1*sin(t)', 0, '0.1*t']}", "time.step=1e-3"], ""),
         (
             ["filament.rod.start={end='hinged', moves=['0.1*cos(t)', 0, 0]}", "time.step=1e-3"],
@@ -59,3 +63,20 @@ def test_a_back_pressure_that_is_a_rounding_error_is_zero():
     (line,) = warnings(Simulation(parse_case(SCENE, "s.toml", ["filament.rod.direction=[1, 0.3, 0]"])))
     assert line.startswith(FORCE)
     assert "(0, 0, -0.125)" in line
+
+
+def test_check_says_whether_flows_turn_rods_by_their_thickness():
+    """And how: the effective aspect ratio, and the period in a shear, of rods that are straight."""
+    flow = ["fluid.model=rft", "fluid.flow=['y', 0, 0]", "filament.rod.radius=0.05"]
+    thin = report(parse_case(SCENE, "s.toml", flow))
+    assert "turns towards a shear, never past it" in thin.split("not modelled:")[1]
+    assert "r_e" not in thin
+    thick = report(parse_case(SCENE, "s.toml", [*flow, "fluid.thick=true"]))
+    assert "never past it" not in thick
+    assert "straight ones tumble in a shear" in thick.split("not modelled:")[0]
+    assert "r_e, effective aspect ratio = 11.56" in thick  # sqrt((1 + 2/32^2)/3)/a
+    assert "shear x period of a turn = 73.17" in thick
+    bent = report(
+        parse_case(SCENE, "s.toml", [*flow, "fluid.thick=true", "filament.rod.shape={kind='circle', curvature=1}"])
+    )
+    assert "r_e" not in bent

@@ -101,7 +101,7 @@ def test_a_point_force_sets_the_fluid_in_motion_as_the_unsteady_stokes_equation_
             tau = end / steps * (1 + w) / (1 + 2 * w)
             response = it.response(FAR, ZERO, 0.0, tau, w)
             answer = response.forced(force, NOTHING, ZERO)
-            it.advance(response, answer.force)
+            it.advance(response, ZERO, answer.force)
         base, weights = it.immersed.stencil(FAR)
         (kx, ky, kz), (sx, sy, sz) = it.grid.wave_numbers()
         blob = np.zeros(it.grid.cells)
@@ -125,7 +125,7 @@ def test_a_net_force_is_carried_by_the_back_pressure_and_the_fluid_gains_no_mome
     it = fluid()
     for k in range(5):
         response = it.response(FAR, ZERO, 0.0, 0.1, float(k > 0))
-        it.advance(response, response.forced(np.array([[1.0, 2.0, -3.0]]), NOTHING, ZERO).force)
+        it.advance(response, ZERO, response.forced(np.array([[1.0, 2.0, -3.0]]), NOTHING, ZERO).force)
     assert np.abs(velocity(it)).max() > 0.01
     assert not it.history.now[:, 0, 0, 0].any()
     assert np.abs(velocity(it).mean(axis=(1, 2, 3))).max() < 1e-16
@@ -159,7 +159,7 @@ def test_asking_changes_nothing_and_only_the_step_asked_for_last_is_taken():
     first = it.response(FAR, ZERO, 0.0, 0.3, 1.0)
     it.response(FAR, ZERO, 0.0, 0.1)
     with pytest.raises(ValueError, match="asked for last"):
-        it.advance(first, ZERO)
+        it.advance(first, ZERO, ZERO)
     for one in (it, other):
         coast(one, 0.2, 0.7)
     assert np.array_equal(it.history.now, other.history.now)
@@ -219,7 +219,7 @@ def test_a_node_turns_with_half_the_vorticity_of_the_past():
 def test_a_torque_on_fluid_at_rest_leaves_the_flow_that_the_stirred_solve_has():
     it, nodes = stirred()
     tau, push = 0.2, np.array([[0.3, -0.1, 0.2, 0.7]])
-    it.advance(it.response(FAR, nodes.axes, 0.0, tau), push)
+    it.advance(it.response(FAR, nodes.axes, 0.0, tau), 0 * push, push)
     solve = TorqueStokesSolve(it.grid, 0.3, alpha=2.0 / tau)
     expected = solve.velocity(nodes.base, nodes.weights, it.immersed.coupling.to_grid(nodes.axes, push))[0, :3]
     assert it.velocity_at(FAR, FAR, nodes.axes, push, tau)[0] == pytest.approx(expected, rel=1e-10)

@@ -77,7 +77,7 @@ def felt(it: NavierStokes, n_now: float, n_old: float) -> np.ndarray:
 
 def coast(it: NavierStokes, dt: float, w: float = 0.0) -> None:
     """A step without forces."""
-    it.advance(it.response(FAR, ZERO, 0.0, dt * (1 + w) / (1 + 2 * w), w), ZERO)
+    it.advance(it.response(FAR, ZERO, 0.0, dt * (1 + w) / (1 + 2 * w), w), ZERO, ZERO)
 
 
 def places(it: NavierStokes) -> np.ndarray:

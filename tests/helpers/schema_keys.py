@@ -126,7 +126,8 @@ def wrong_types(key: Key) -> list[Any]:
     if isinstance(kind, Number | Formula):
         return [True, False, [1.0], {"a": 1}]
     if tables(key.hint) or get_origin(key.hint) is dict:
-        return [3, True, [1], *([] if literals(key.hint) else ["word"])]
+        switch = bool in [bare(member)[0] for member in get_args(bare(key.hint)[0])]
+        return [3, [1], *([] if switch else [True]), *([] if literals(key.hint) else ["word"])]
     if get_origin(key.hint) is tuple:
         repeat = any(isinstance(item, Listed) and item.repeat for item in key.metadata)
         length = next(item for item in key.metadata if isinstance(item, Listed)).length

@@ -47,7 +47,7 @@ def pumped(reynolds: float, cells: int, periods: int, steps: int) -> float:
         moves = tau * np.stack([0 * s, -AMPLITUDE * np.cos(s - t), 0 * s], axis=1)
         response = fluid.response(np.stack([s, AMPLITUDE * np.sin(s - t), 0 * s], axis=1), zero, t, tau, w)
         answer = response.forced(zero, Prescribed(np.arange(3 * cells), moves.ravel()), zero)
-        fluid.advance(response, answer.force)
+        fluid.advance(response, answer.move / tau, answer.force)
         if m > steps * (periods - 1):
             forces.append(answer.force[:, 0].sum())
             u = np.fft.irfftn(fluid.history.now, shape, axes=(1, 2, 3)) * np.prod(shape)

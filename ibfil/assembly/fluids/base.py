@@ -109,6 +109,10 @@ class FluidModel(ABC):
     def drag(self, filament: Filament) -> float:
         """A drag per length across, for time scales."""
 
+    def turning_drag(self, rods: RodStack, where: slice) -> float | None:
+        """Torque per rate of turning a straight filament, nodes ``where``, about its middle; None: not known."""
+        return None
+
     def automatic_limit(self, longest: float) -> float:
         """The longest automatic step, given the ``longest`` that the fluid's own motion allows."""
         return longest

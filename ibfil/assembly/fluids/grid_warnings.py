@@ -21,6 +21,7 @@ BEADS_SPACING = 2.5  # ds/h beyond which the drag of a straight rod changes with
 SLENDER_RADIUS = 0.2  # a/L above which a rod is shorter than 2.5 of its own diameters
 CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the motion
 TWIST_RADIUS_SHARE = 0.98  # of the grid's: above, a rod's own spin does not keep its torques from locking
+THICKNESS = 1.25  # ratio of a rod's radius and the grid's up to which they are taken for one
 FLOW_JUMP = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
 
 
@@ -88,6 +89,20 @@ def of_spin(case: Case, name: str) -> list[str]:
         *out,
         f"{key}.radius: {largest:.4g} is above {widest:.4g}, the radius that a rod on this grid has when it spins: "
         'it spins as one of that; take fewer fluid.cells, a wider fluid.kernel, or fluid.rotation = "local"',
+    ]
+
+
+def of_thickness(case: Case, name: str, radius: float) -> list[str]:
+    """A rod whose radius makes its couple in a flow, and is not the one that the grid drags it with."""
+    filament = case.filaments[name]
+    if not case.fluid.thick or filament.radius is None:
+        return []
+    own = float(np.max(filament.radius.bind("s", "t")(np.linspace(0.0, filament.length, 11), 0.0)))
+    if 1 / THICKNESS < own / radius < THICKNESS:
+        return []
+    return [
+        f"filament.{name}.radius: {own:.3g} makes the couple of the flow across it (fluid.thick); the grid drags it "
+        f"with {radius:.3g}: it tumbles as neither would; leave radius out, or take other fluid.cells"
     ]
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 FIELDS = "fields and their transforms"
 BAND = "band matrix"
+MOST_NODES = 400  # of a rod whose drag on turning is solved for: a dense system of three times as many
 
 
 class ImmersedModel(FluidModel):
@@ -67,7 +68,10 @@ class ImmersedModel(FluidModel):
         spin = drag(case, rods).spin if local else None
         number = np.float32 if case.fluid.single else np.float64
         coupling = grids.coupling(case, rods)
-        return immersed_boundary.Immersed(space, self.kernel, eta, slip, spin, self.flow, rods.nodes, number, coupling)
+        twists = rods.twists.astype(float) if local else None
+        return immersed_boundary.Immersed(
+            *(space, self.kernel, eta, slip, spin, self.flow, twists, rods.nodes, number, coupling)
+        )
 
     def method(self, rods: RodStack) -> str:
         """The case's, or the cheapest by counts."""
@@ -154,6 +158,19 @@ class ImmersedModel(FluidModel):
         """4 pi eta, whatever the grid."""
         return 4 * np.pi * self.case.fluid.viscosity
 
+    def turning_drag(self, rods: RodStack, where: slice) -> float | None:
+        """By the exact Stokes mobility of its nodes, alone, where it stands: the mean of the two ways to turn."""
+        if where.stop - where.start > MOST_NODES:
+            return None
+        immersed, start = self.immersed(rods), rods.start
+        nodes = immersed.nodes(start.r, start.e3)[where]
+        mobility = immersed.mobility().matrix(nodes, immersed.own[where])
+        r = start.r[where] - np.average(start.r[where], axis=0, weights=rods.system.mesh.volume[where])
+        n, c = len(r), self.components
+        pushed = mobility.reshape(n, c, n, c)[:, :3, :, :3].reshape(3 * n, 3 * n)
+        turns = np.stack([np.cross(e, r).ravel() for e in (start.e1[where][0], start.e2[where][0])], axis=1)
+        return 0.5 * float(np.sum(turns * np.linalg.solve(pushed, turns)))
+
     def modelled(self) -> list[str]:
         """Slip, and how rods spin."""
         out = []
@@ -193,8 +210,12 @@ class ImmersedModel(FluidModel):
         return out
 
     def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
-        """Nodes and waves that the grid cannot tell apart, rods that it cannot spin."""
-        return [*grid_warnings.of_nodes(self.case, name, groups), *grid_warnings.of_spin(self.case, name)]
+        """Nodes and waves that the grid cannot tell apart, rods that it cannot spin, or as thick as they are said."""
+        return [
+            *grid_warnings.of_nodes(self.case, name, groups),
+            *grid_warnings.of_spin(self.case, name),
+            *grid_warnings.of_thickness(self.case, name, self.line_radius),
+        ]
 
     # -- pictures and recorded runs
 

@@ -29,13 +29,17 @@ class ResistiveForceModel(FluidModel):
         """Drag per node, in the background flow."""
         from ...fluids.resistive_force import ResistiveForce
 
-        return ResistiveForce(drag(self.case, rods), rods.system.profile, self.flow)
+        mesh, twists = rods.system.mesh, rods.twists.astype(float) if rods.system.unknowns == 4 else None
+        spacing = float(np.min(mesh.ds[mesh.joined]))
+        return ResistiveForce(drag(self.case, rods), rods.system.profile, self.flow, twists, spacing)
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """The heat of drag."""
         from ...fluids.output import DragOutput
+        from ...fluids.resistive_force import ResistiveForce
 
-        return DragOutput(self.flow)
+        assert isinstance(fluid, ResistiveForce)
+        return DragOutput(fluid)
 
     def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
         """Drag alone."""
@@ -46,6 +50,11 @@ class ResistiveForceModel(FluidModel):
         """The case's own, across."""
         radius = None if filament.radius is None else np.atleast_1d(filament.radius.bind("s", "t")(0.0, 0.0))
         return drag_coefficients(self.case, filament, radius)[0]
+
+    def turning_drag(self, rods: RodStack, where: slice) -> float:
+        """The sum of zeta_perp Lc s^2, s from the middle of the drag."""
+        perp, s = drag(self.case, rods).perp[where], rods.s[where]
+        return float(np.sum(perp * (s - np.average(s, weights=perp)) ** 2))
 
     def modelled(self) -> list[str]:
         """Drag, and where its coefficients come from."""

@@ -17,17 +17,12 @@ from ..fluid import Coefficients, Fluid, Matched
 from ..schema import Observe, Scene
 from .filament import check_filament
 from .size import check_size
+from .thickness import check_thickness
 
 SUPPORT = {"roma3": 3, "peskin4": 4, "bspline4": 4, "bspline6": 6, "bkp6": 6, "es4": 4, "es5": 5, "es6": 6}
 LONGEST = 500  # segments of the straight rod that drag is matched to: more would be a long wait
-VECTORS = (
-    "position",
-    "velocity",
-    "displacement",
-    "drift",
-    "force",
-    "torque",
-)  # three numbers where `along` is absent
+# Three numbers where `along` is absent.
+VECTORS = ("position", "velocity", "displacement", "drift", "force", "torque")
 
 
 def check(case: Scene) -> Iterator[Fault]:
@@ -42,6 +37,7 @@ def check(case: Scene) -> Iterator[Fault]:
         _grid,
         _drag,
         _matched,
+        check_thickness,
         _thermal,
         _time,
         _output,

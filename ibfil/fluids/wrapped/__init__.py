@@ -1,0 +1,1 @@
+"""A fluid around a fluid: rods that feel their own velocity."""
