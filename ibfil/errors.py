@@ -1,4 +1,4 @@
-"""The ways in which ibfil says no: a bad case, a failed run, an interrupted run."""
+"""The ways in which ibfil says no: a bad case or file, a failed run, an interrupted run."""
 
 from __future__ import annotations
 
@@ -11,6 +11,13 @@ class CaseError(Exception):
     def __init__(self, faults: Sequence[str]) -> None:
         super().__init__("\n".join(faults))
         self.faults = list(faults)
+
+
+class RunFileError(CaseError):
+    """A file of a run that cannot be read, or not be written as asked: one line (exit status 2)."""
+
+    def __init__(self, line: str) -> None:
+        super().__init__([line])
 
 
 class RunFailed(Exception):

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "ibfil"
 # From the ground up: what stands later may import what stands before it, never the other way round.
 ORDER = (
-    *("version", "errors", "cache", "threads"),
+    *("version", "errors", "cache", "screen", "threads"),
     *("linalg", "grid", "rods", "fluids", "timestepping"),
     *("case", "io", "observables", "shapes", "assembly", "simulation", "check", "running"),
     *("analysis", "visualization", "bench", "studies", "commands"),
@@ -133,11 +133,8 @@ def test_no_files_import_each_other_in_a_round():
 LONG_FILES = {  # lines today; the list only shrinks
     "case/consistency/scene.py": 311,
     "case/expressions.py": 390,
-    "io/reader.py": 361,
-    "io/writer.py": 373,
     "observables/local.py": 387,
     "rods/torque_free.py": 358,
-    "running/loop.py": 310,
     "simulation/simulation.py": 385,
 }
 LONG_FUNCTIONS: set[str] = set()

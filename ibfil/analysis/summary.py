@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..io.overwriting import replacing, table_of
 from ..io.reader import RunFile
 from ..io.units import label
 from ..observables.base import Observable
@@ -186,16 +187,26 @@ def as_json(told: Mapping[str, Any]) -> str:
     return json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def write_csv(run: RunFile, path: str | Path) -> None:
-    """Time and all observables as a table under one row of names, all digits; a vector in three columns."""
-    columns: dict[str, np.ndarray] = {"time": run.time}
+TABLE = table_of("time")  # what `write_csv` writes
+
+
+def write_csv(run: RunFile, path: Path) -> None:
+    """Time and all observables as a table under one row of names, all digits; a vector in three columns.
+
+    A name has its units behind it, "speed (um/s)", where the case labels any.
+    """
+    columns: dict[str, np.ndarray] = {_heading("time", run.units("time")): run.time}
     for name, column in run.observables.items():
-        values = np.asarray(column)
+        values, units = np.asarray(column), run.units(f"observables/{name}")
         if values.ndim == 1:
-            columns[name] = values
+            columns[_heading(name, units)] = values
         else:
-            columns |= {f"{name}_{axis}": values[:, i] for i, axis in enumerate("xyz")}
-    with Path(path).open("w", newline="", encoding="utf-8") as out:
+            columns |= {_heading(f"{name}_{axis}", units): values[:, i] for i, axis in enumerate("xyz")}
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(columns)
         writer.writerows(zip(*(map(repr, c.tolist()) for c in columns.values()), strict=True))
+
+
+def _heading(name: str, units: str) -> str:
+    return name if units == "1" else f"{name} ({units})"

@@ -7,6 +7,7 @@ before it reads, and the text here says so.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -222,3 +223,10 @@ class Case(Scene):
     text: str
     file: str
     deprecated: tuple[str, ...] = ()
+
+    @property
+    def reads(self) -> list[Path]:
+        """The files that a run of it reads: its own, and those that shapes and places are in."""
+        named = [getattr(f.shape, "path", None) for f in self.filaments.values()]
+        named += [f.copies.file for f in self.filaments.values() if f.copies is not None]
+        return [Path(self.file), *(Path(self.file).parent / name for name in named if name)]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError
+from ..screen import warn
 from ..threads import set_threads
 
 if TYPE_CHECKING:
@@ -108,11 +108,6 @@ def only_changes(words: Sequence[str]) -> None:
 # --- lines to the screen ----------------------------------------------------------------------------------------------
 
 
-def log(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)
-
-
 def say_if_cold() -> None:
     """Say so where numba has yet to compile: it keeps kernels beside their files, or under a hash of the path."""
     import hashlib
@@ -123,4 +118,4 @@ def say_if_cold() -> None:
     cache = Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache_path("numba", appauthor=False))
     elsewhere = cache / f"{package.name}_{hashlib.sha1(str(package).encode()).hexdigest()}"
     if not any((package / "__pycache__").glob("*.nbi")) and not any(elsewhere.glob("*.nbi")):
-        print("compiling the numerical kernels, once: half a minute or so", file=sys.stderr, flush=True)
+        warn("compiling the numerical kernels, once: half a minute or so")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ..screen import tell
 from .arguments import DONE
 
 NAME, HELP = "cases", "list the shipped cases"
@@ -24,7 +25,7 @@ def do(arguments: argparse.Namespace) -> int:
     for row in rows:
         if row.group != group:
             group = row.group
-            print(f"{group}/")
-        print(f"  {row.name:{width}}  {row.title}")
-        print(f"  {'':{width}}    {row.source}")
+            tell(f"{group}/")
+        tell(f"  {row.name:{width}}  {row.title}")
+        tell(f"  {'':{width}}    {row.source}")
     return DONE

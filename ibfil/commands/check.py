@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ..screen import tell
 from .arguments import DONE, add_case, read_case
 
 NAME, HELP = "check", "run nothing: what is modelled, sizes, stable steps, estimated time, warnings"
@@ -19,5 +20,5 @@ def do(arguments: argparse.Namespace) -> int:
     case = read_case(arguments.words)
     from ..check.report import report
 
-    print(report(case))
+    tell(report(case))
     return DONE

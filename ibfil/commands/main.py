@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import CaseError, Interrupted, RunFailed
+from ..screen import let_go, lost, prepare, warn
 from ..version import __version__
 from . import bench, cases, check, new, render, run, schema, show, verify, vtk
 from .arguments import BAD_INPUT, CUT, FAILED
@@ -26,23 +27,27 @@ NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own); returns the exit status."""
-    arguments = parse(list(sys.argv[1:] if argv is None else argv))
+    prepare()
+    os.environ["MPLBACKEND"] = "agg"  # no window; one that the surroundings ask for may not be there at all
+    words = list(sys.argv[1:] if argv is None else argv)
+    strange = [word for word in words if not _is_text(word)]
+    if strange:
+        return _say([f"command line: found {strange[0]}, whose bytes are not UTF-8; allowed: UTF-8"], BAD_INPUT)
+    arguments = parse(words)
     try:
         status: int = arguments.do(arguments)
-        sys.stdout.flush()
-        return status
+        return status if not lost() else _say([f"standard output cannot be written ({lost()})"], status or FAILED)
     except BrokenPipeError:
-        _let_go()
+        let_go()
         return FAILED
+    except MemoryError as error:
+        found = f"not enough memory ({error})" if str(error) else "not enough memory"
+        return _say([found, "what to change: fewer nodes, cells or outputs, or a machine with more"], FAILED)
     except CaseError as error:
         return _say(error.faults, BAD_INPUT)
     except RunFailed as error:
         return _say(str(error).splitlines(), FAILED)
     except (Interrupted, KeyboardInterrupt) as error:
-        try:
-            sys.stdout.flush()
-        except BrokenPipeError:
-            _let_go()
         return _say(str(error).splitlines() or ["interrupted"], CUT)
     except OSError as error:
         faults = [] if error.errno is not None else _damages(arguments)  # HDF5 gives no number
@@ -95,13 +100,17 @@ def _damages(arguments: argparse.Namespace) -> list[str]:
     return examine(Path(path))
 
 
-def _let_go() -> None:
-    """The reader (`| head`) has gone: what Python still holds for it must not raise again at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _is_text(word: str) -> bool:
+    """Whether a word came as UTF-8: bytes that are none are halves of letters in it."""
+    try:
+        word.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _say(faults: Sequence[str], status: int) -> int:
     """Faults to standard error, one line each."""
     for fault in faults:
-        print(f"ibfil: {fault}", file=sys.stderr)
+        warn(f"ibfil: {fault}")
     return status

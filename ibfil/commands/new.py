@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ..screen import tell
 from .arguments import DONE
 
 NAME, HELP = "new", "copy a shipped case to a file, to edit it"
@@ -19,5 +20,5 @@ def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     from ..case import library
 
-    print(f"{arguments.name} -> {library.copy(arguments.name, arguments.file)}")
+    tell(f"{arguments.name} -> {library.copy(arguments.name, arguments.file)}")
     return DONE

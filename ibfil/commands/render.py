@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from .arguments import DONE, log, pixels
+from ..screen import tell
+from .arguments import DONE, pixels
 
 NAME, HELP = "render", "draw a run without a display: a picture (png) or a film (mp4, gif)"
 
@@ -13,6 +14,7 @@ def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     command.add_argument("run", metavar="RUN.h5")
     command.add_argument("-o", dest="output", metavar="FILE", required=True, help="film.mp4, film.gif or picture.png")
+    command.add_argument("--force", action="store_true", help="write over a picture or film that is there already")
     command.add_argument("--colour", default="tension", metavar="WHAT", help="tension, moment, curvature, speed ...")
     command.add_argument("--flow", default="none", metavar="HOW", help="none, slice, glyphs or streamlines")
     command.add_argument("--montage", type=int, default=0, metavar="N", help="N shapes over the run in one picture")
@@ -28,5 +30,5 @@ def do(arguments: argparse.Namespace) -> int:
 
     a = arguments
     wish = Wish(a.colour, a.flow, a.montage, a.time, a.size, a.fps, a.every)
-    print(render(a.run, a.output, wish, log))
+    tell(render(a.run, a.output, wish, tell, overwrite=a.force))
     return DONE

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError
+from ..screen import tell
 from ..threads import set_threads
-from .arguments import DONE, add_case, log, only_changes, read_case, say_if_cold
+from .arguments import DONE, add_case, only_changes, read_case, say_if_cold
 
 if TYPE_CHECKING:
-    from ..running.loop import Result
+    from ..running.result import Result
 
 NAME, HELP = "run", "run a case: a file, or the name of a shipped case"
 
@@ -40,7 +41,7 @@ def do(arguments: argparse.Namespace) -> int:
     from ..running.run import run
 
     changes = " ".join(word for word in words[1:] if not word.startswith(("output.", "compute.")))
-    return _end(run(case, output, overwrite=arguments.force, log=log), changes)
+    return _end(run(case, output, overwrite=arguments.force, log=tell), changes)
 
 
 def _resume(arguments: argparse.Namespace) -> int:
@@ -56,7 +57,7 @@ def _resume(arguments: argparse.Namespace) -> int:
     say_if_cold()
     from ..running.run import resume_run
 
-    return _end(resume_run(arguments.resume, case, () if with_case else words, log=log))
+    return _end(resume_run(arguments.resume, case, () if with_case else words, log=tell))
 
 
 def _threads_of(run: str) -> int:
@@ -64,8 +65,8 @@ def _threads_of(run: str) -> int:
     import subprocess
 
     code = (
-        "import sys, pathlib; from ibfil.case.reading import parse_case; from ibfil.io import checkpoint, reader; "
-        "c = checkpoint.read(reader.checkpoint_path(pathlib.Path(sys.argv[1]))); "
+        "import sys, pathlib; from ibfil.case.reading import parse_case; from ibfil.io import checkpoint, paths; "
+        "c = checkpoint.read(paths.checkpoint_path(pathlib.Path(sys.argv[1]))); "
         "print(parse_case(c.case, c.file).compute.threads)"
     )
     answer = subprocess.run([sys.executable, "-c", code, run], capture_output=True, text=True, check=False)
@@ -81,7 +82,7 @@ def _end(result: Result, changes: str = "") -> int:
     with RunFile(result.path) as run:
         told = digest(run)
     reason = f" ({told['reason']})" if told["reason"] else ""
-    print(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
-    print(f"{result.path}: {told['outputs']} outputs")
-    print(results(told, changes))
+    tell(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
+    tell(f"{result.path}: {told['outputs']} outputs")
+    tell(results(told, changes))
     return DONE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ..screen import tell
 from .arguments import DONE
 
 NAME, HELP = "schema", "print every table and key of a case"
@@ -21,10 +22,10 @@ def do(arguments: argparse.Namespace) -> int:
     from ..case.listing import schema_json, schema_text
 
     if arguments.json:
-        print(json.dumps(schema_json(), indent=2))
+        tell(json.dumps(schema_json(), indent=2))
         return DONE
     from ..observables.factory import kinds_text
 
-    print(schema_text())
-    print(kinds_text())
+    tell(schema_text())
+    tell(kinds_text())
     return DONE

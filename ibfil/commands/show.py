@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
+from ..screen import tell
 from .arguments import DONE
 
 NAME, HELP = "show", "what is in a run: case, versions, summary, observables"
@@ -15,20 +17,27 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="the summary as JSON")
     command.add_argument("--plot", metavar="FILE.png", help="draw the run (png, pdf or svg)")
     command.add_argument("--csv", metavar="FILE.csv", help="write time and all observables as a table")
+    command.add_argument("--force", action="store_true", help="write over a picture or table that is there already")
 
 
 def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     from ..analysis import summary
+    from ..io.overwriting import refuse
     from ..io.reader import RunFile
 
+    run_file, force = Path(arguments.run), arguments.force
+    if arguments.csv:
+        refuse(Path(arguments.csv), summary.TABLE, force, [run_file])
+    if arguments.plot:
+        from ..visualization.run_figure import draw, kind_of
+
+        refuse(Path(arguments.plot), kind_of(Path(arguments.plot)), force, [run_file])
     with RunFile(arguments.run) as run:
         told = summary.digest(run)
-        print(summary.as_json(told) if arguments.json else summary.as_text(told))
+        tell(summary.as_json(told) if arguments.json else summary.as_text(told))
         if arguments.csv:
-            summary.write_csv(run, arguments.csv)
+            summary.write_csv(run, Path(arguments.csv))
         if arguments.plot:
-            from ..visualization.run_figure import draw
-
             draw(run, arguments.plot)
     return DONE

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from ..screen import tell
 from ..threads import set_threads
-from .arguments import log, say_if_cold
+from .arguments import say_if_cold
 
 NAME, HELP = "verify", "run shipped or given cases and hold their [expect] numbers against the result"
 
@@ -22,4 +23,4 @@ def do(arguments: argparse.Namespace) -> int:
     say_if_cold()
     from ..studies.verify import verify
 
-    return verify(arguments.cases, arguments.quick, log)
+    return verify(arguments.cases, arguments.quick, tell)

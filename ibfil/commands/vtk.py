@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from .arguments import DONE, digit, log, seconds
+from ..screen import tell
+from .arguments import DONE, digit, seconds
 
 NAME, HELP = "vtk", "write ParaView files: a .pvd collection of filaments and fields"
 
@@ -24,10 +25,10 @@ def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     from ..visualization.vtk_files import write_vtk
 
-    more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": log}
+    more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": tell}
     path = write_vtk(arguments.run, arguments.folder, **more)
-    print(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
+    tell(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
     alone = path.with_stem(f"{path.stem}_filaments")
     if alone.exists():
-        print(f"for filters of lines, such as Tube: {alone}, without the grid")
+        tell(f"for filters of lines, such as Tube: {alone}, without the grid")
     return DONE

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Mapping
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,17 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .reader import RunFileError
+from ..errors import RunFileError
+from .disk import sync_folder, write_all
+from .opening import open_hdf5
+from .ownership import open_new
+from .paths import part_path
+from .vetting import FLOATS, look_over
 
 FORMAT = "ibfil-checkpoint"
 FORMAT_VERSION = 2
 
+_KINDS = FLOATS + "ciubS"  # of what is in it
 State = Mapping[str, "np.ndarray | float | int | str"]
 
 
@@ -40,7 +47,7 @@ _SCALARS = ("time", "steps", "outputs", "fields", "wall_time", "case", "file", "
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
-    """Replace ``path``; on return it is on the disk. Raises OSError, and then the old one is still there.
+    """Replace ``path``; on return it is on the disk. Raises OSError and Stranger, and then the old one is still there.
 
     The file is made in memory, because HDF5 cannot be trusted to survive a disk that is full.
     """
@@ -52,17 +59,19 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
         group = file.create_group("state")
         for key, value in checkpoint.state.items():
             _put(group, key, value)
-    part = path.with_name(path.name + ".part")
+    part = part_path(path)
+    handle = open_new(part)
     try:
-        with open(part, "wb") as out:
-            out.write(image.getbuffer())
-            out.flush()
-            os.fsync(out.fileno())
+        write_all(handle, image.getbuffer(), 0)
+        os.fsync(handle)
         os.replace(part, path)
     except OSError:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise
-    _sync_folder(path.parent)
+    finally:
+        os.close(handle)
+    sync_folder(path.parent)
 
 
 def read(path: Path) -> Checkpoint:
@@ -70,17 +79,22 @@ def read(path: Path) -> Checkpoint:
     if not path.is_file():
         raise RunFileError(f"{path}: there is no such checkpoint")
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        opened = open_hdf5(path)
+        with closing(opened):
+            file = opened.h5
             if file.attrs["format"] != FORMAT:
                 raise ValueError(FORMAT)
             if file.attrs["format_version"] != FORMAT_VERSION:
                 found = f"is a checkpoint of format {int(file.attrs['format_version'])}"
                 remedy = "go on with the ibfil that `ibfil show` says the run was written by"
                 raise RunFileError(f"{path}: {found}; this ibfil goes on from format {FORMAT_VERSION}: {remedy}")
+            look_over(file, path, opened.size, _KINDS)
             state: dict[str, Any] = {}
             file["state"].visititems(lambda key, item: _get(state, key, item))
             scalars = {name: file.attrs[name] for name in _SCALARS}
-    except (OSError, KeyError, ValueError, RuntimeError):
+    except PermissionError as error:
+        raise RunFileError(f"{path}: cannot be read ({error.strerror})") from None
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError):
         raise RunFileError(f"{path}: is not a checkpoint of ibfil, or is damaged") from None
     kinds = {"time": float, "wall_time": float, "steps": int, "outputs": int, "fields": int}
     return Checkpoint(state=state, **{name: kinds.get(name, str)(value) for name, value in scalars.items()})
@@ -111,12 +125,3 @@ def _get(state: dict[str, Any], key: str, item: Any) -> None:
     else:
         text = value.decode()
         state[key] = int(text) if kind == "int" else text
-
-
-def _sync_folder(folder: Path) -> None:
-    """Have the new name on the disk as well."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

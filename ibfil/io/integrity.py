@@ -7,8 +7,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ..errors import CaseError
-from .reader import RunFile, RunFileError, damaged
+from ..errors import CaseError, RunFileError
+from .opening import damaged
+from .reader import RunFile
 
 _ROWS = 4096  # read at once
 

@@ -11,7 +11,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from ..version import __version__
-from .reader import FORMAT, FORMAT_VERSION
+from .opening import FORMAT, FORMAT_VERSION
 
 if TYPE_CHECKING:
     from ..case.schema import Case

@@ -10,7 +10,6 @@ A file may be read while its run goes on: it is opened without a lock, and shows
 from __future__ import annotations
 
 import json
-import time as clock
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
@@ -19,9 +18,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import h5py
 import numpy as np
 
-from ..errors import CaseError
-from . import journal
+from ..errors import RunFileError
+from .opening import damaged, open_run_file
+from .ownership import is_being_written
 from .pace import pace_of
+from .paths import journal_path
 from .snapshots import FilamentSnapshot, Snapshot
 
 if TYPE_CHECKING:
@@ -29,29 +30,11 @@ if TYPE_CHECKING:
     from ..case.schema import Case
 
 
-FORMAT = "ibfil-run"
-FORMAT_VERSION = 1
 # Of FilamentFrame: there where that end is held, and where the filament twists.
 _OPTIONAL = ("reaction_start", "reaction_finish", "torque", "spin")
 _KEYS = ("position", "velocity", "force", "e1", "moment", "strain", "tension", *_OPTIONAL)
+_GROUPS = ("filaments", "observables", "diagnostics")
 _BLOCK = 256  # outputs read at once by `frames`
-
-
-class RunFileError(CaseError):
-    """A run file that cannot be read, or not be written as asked: one line (exit status 2)."""
-
-    def __init__(self, line: str) -> None:
-        super().__init__([line])
-
-
-def checkpoint_path(path: Path) -> Path:
-    """RUN.ckpt.h5, where RUN.h5 can be gone on from."""
-    return path.with_name(path.name.removesuffix(".h5") + ".ckpt.h5")
-
-
-def journal_path(path: Path) -> Path:
-    """RUN.journal, which is there while RUN.h5 is being written (journal.py)."""
-    return path.with_name(path.name.removesuffix(".h5") + ".journal")
 
 
 class Column:
@@ -108,28 +91,18 @@ class RunFile:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         # Looked at first: a writer that ends after this has said in the file how.
-        self._was_written = journal.is_being_written(journal_path(self.path))
-        self._file = _open(self.path)
-        try:
-            _check_format(self._file, self.path)
-            self._rows = self._whole_outputs()
-        except BaseException as error:
-            self._file.close()
-            if isinstance(error, Exception) and not isinstance(error, CaseError):  # HDF5 on bytes it did not write
-                raise RunFileError(damaged(self.path)) from error
-            raise
-
-    def _whole_outputs(self) -> int:
-        """Count the outputs that every dataset has; a writer may be at work on the last one."""
-        lengths = [len(self._file["time"])]
-        lengths += [len(d) for group in self._file["filaments"].values() for d in group.values()]
-        for name in ("observables", "diagnostics"):
-            lengths += [len(d) for d in self._file[name].values()]
-        return min(lengths)
+        self._was_written = is_being_written(journal_path(self.path))
+        self._opened, found = open_run_file(self.path)
+        self._file = self._opened.h5
+        # The outputs that every dataset has; a writer may be at work on the last one.
+        self._rows = min((rows for name, rows in found.items() if not name.startswith("grid/")), default=0)
+        if not {"time", *_GROUPS} <= set(self._file):
+            self.close()
+            raise RunFileError(damaged(self.path))
 
     def close(self) -> None:
         """Close the file; arrays not read by now are lost."""
-        self._file.close()
+        self._opened.close()
 
     def __enter__(self) -> Self:
         return self
@@ -215,7 +188,7 @@ class RunFile:
         """
         status = self._attribute("status")
         if status == "running" and not self._was_written:
-            return "running" if journal.is_being_written(journal_path(self.path)) else "cut"
+            return "running" if is_being_written(journal_path(self.path)) else "cut"
         return status
 
     @property
@@ -305,56 +278,3 @@ class RunFile:
 def _filament_snapshot(arrays: dict[str, np.ndarray], i: int) -> FilamentSnapshot:
     values: dict[str, Any] = {key: arrays[key][i] if key in arrays else None for key in _KEYS}
     return FilamentSnapshot(**values)
-
-
-def _open(path: Path) -> h5py.File:
-    """Open, put right what a killed writer left, and wait a moment for one that is at work."""
-    if not path.is_file():
-        raise RunFileError(f"{path}: there is no such file")
-    for _ in range(10):
-        try:
-            journal.recover(path, journal_path(path))
-            return _open_unlocked(path)
-        except PermissionError as error:
-            raise RunFileError(f"{path}: cannot be read ({error.strerror})") from None
-        except OSError:
-            if not journal.is_being_written(journal_path(path)):
-                break
-            clock.sleep(0.05)
-    with open(path, "rb") as file:
-        if file.read(8) != b"\x89HDF\r\n\x1a\n" and not checkpoint_path(path).exists():
-            raise RunFileError(f"{path}: is not a run file of ibfil")
-    raise RunFileError(damaged(path))
-
-
-def _open_unlocked(path: Path) -> h5py.File:
-    """Open without a lock; with one where this process has it open so already, which HDF5 must have alike."""
-    try:
-        return h5py.File(path, "r", locking=False)
-    except OSError:
-        return h5py.File(path, "r")
-
-
-def _check_format(file: h5py.File, path: Path) -> None:
-    if str(file.attrs.get("format", "")) != FORMAT:
-        raise RunFileError(f"{path}: is an HDF5 file, but not a run file of ibfil")
-    version = int(file.attrs["format_version"])
-    if version != FORMAT_VERSION:
-        raise RunFileError(f"{path}: {other_format(version, str(file.attrs['ibfil_version']))}")
-
-
-def other_format(version: int, written_by: str) -> str:
-    """The error for a file of another format version."""
-    if version > FORMAT_VERSION:
-        remedy = f"read it with ibfil {written_by} or later (pip install -U ibfil)"
-    else:
-        remedy = f"read it with ibfil {written_by}, or run its case again (it is in the attribute `case`)"
-    return f"has format {version}, written by ibfil {written_by}; this ibfil reads format {FORMAT_VERSION}: {remedy}"
-
-
-def damaged(path: Path) -> str:
-    """The error for a file that cannot be read."""
-    line = f"{path}: is damaged or cut short"
-    if checkpoint_path(path).exists():
-        line += f"; `ibfil run --resume {path}` rebuilds it"
-    return line

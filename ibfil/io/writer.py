@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import time as clock
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields as fields_of
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,11 +17,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import h5py
 import numpy as np
 
-from ..errors import RunFailed
-from .journal import Busy, JournaledFile
+from ..errors import RunFailed, RunFileError
+from .datasets import FIELDS, Meaning, meaning_of, rows_of
+from .disk import failed_write
+from .journal import JournaledFile
+from .overwriting import CHECKPOINT, RUN, refuse
+from .ownership import Busy, Stranger, remove_part
 from .pace import pace_of
+from .paths import checkpoint_path, journal_path, part_path
 from .provenance import about, now
-from .reader import RunFileError, checkpoint_path, journal_path
 from .snapshots import Snapshot
 from .units import label
 
@@ -33,49 +36,6 @@ if TYPE_CHECKING:
 _CHUNK = 32768  # bytes: the part of a dataset that an append rewrites
 _PAUSE = 1.0  # seconds between two writes, or _SHARE times what the last one took
 _SHARE = 50
-
-# Dataset -> its dimension (units.py) and description.
-_FILAMENT = {
-    "position": ("length", "positions of the nodes, unwrapped"),
-    "velocity": ("length/time", "velocities of the nodes"),
-    "force": ("force", "force of each node on the fluid, reactions of supports included"),
-    "e1": ("1", "first material director at the nodes"),
-    "moment": ("force length", "internal moment at the nodes along e1, e2, e3"),
-    "strain": ("1/length", "strains Omega_1, Omega_2, Omega_3 at the nodes"),
-    "tension": ("force", "tension of the segments between nodes, positive when stretched"),
-    "reaction_start": ("force", "force of the support on the node at s = 0"),
-    "reaction_finish": ("force", "force of the support on the node at s = L"),
-    "torque": ("force length", "twist torque of each node on the fluid, along the tangent"),
-    "spin": ("1/time", "rate at which the first material director turns about the tangent, along it"),
-}
-_DIAGNOSTICS = {
-    "net_force": ("force", "total force on the fluid"),
-    "net_torque": ("force length", "total torque on the fluid"),
-    "stretch_max": ("1", "largest stretch of a segment, length over rest length minus 1"),
-    "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
-    "power": ("force length/time", "power of the nodal forces and twist torques on the fluid"),
-    "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
-    "couple_dissipation": ("force length/time", "the part of it by the couple of flows across the rods' thickness"),
-    "grid_power": ("force length/time", "power of the nodal forces upon the grid's own flow"),
-    "slip_power": ("force length/time", "power lost between nodes and grid: the slip's share"),
-    "contacts": ("1", "pairs of segments in contact"),
-    "first_contact": ("time", "time of the first contact that was warned of; NaN before"),
-    "newton_iterations": ("1", "Newton iterations of the last step"),
-    "steps_shortened": ("1", "steps so far that had to be tried again with a shorter one"),
-    "probe_velocity": ("length/time", "velocity at output.probes"),
-}
-_FIELDS = {
-    "velocity": ("length/time", "velocity of the fluid"),
-    "vorticity": ("1/time", "vorticity of the fluid"),
-    "pressure": ("force/length/length", "pressure of the fluid"),
-}
-
-
-class Meaning(NamedTuple):
-    """The meaning of a dataset: its dimension as in units.py, and words."""
-
-    dimension: str
-    description: str
 
 
 class GridPlace(NamedTuple):
@@ -99,6 +59,7 @@ class Recorder:
         self._columns: dict[str, h5py.Dataset] = {}  # what every output adds a row to
         self._pending: list[dict[str, Any]] = []
         self._next = 0.0
+        self.notices: list[str] = []  # what has happened to the file and nobody was told yet
         self.outputs = self.fields = 0  # rows of the file, those still to be written included
 
     @classmethod
@@ -123,21 +84,21 @@ class Recorder:
         the scene. Raises RunFileError where the file exists and ``overwrite`` is not set, or another process is
         writing it.
         """
-        refuse_existing(path, overwrite)
-        new = not path.exists()
+        refuse(path, RUN, overwrite)
+        refuse(checkpoint_path(path), CHECKPOINT, True)
         with _writing(path), _owned(path):
+            remove_part(part_path(checkpoint_path(path)))
             file = JournaledFile(path, journal_path(path), create=True)
         self = cls(path, file, case.units, grid)
-        with _begun(path, new), _closing(self), _writing(path, file):
-            checkpoint_path(path).unlink(missing_ok=True)  # before the run it belongs to
-            file.clear()
+        with _closing(self), _writing(path, file):
+            checkpoint_path(path).unlink(missing_ok=True)  # before its run
             self._h5 = h5py.File(file, "w")
             self._h5.attrs.update(about(case, method, wisdom, groups))
             for group in ("filaments", "observables", "diagnostics"):
                 self._h5.create_group(group)
-            for name, value in _rows(snapshot, series).items():
+            for name, value in rows_of(snapshot, series).items():
                 shape = np.asarray(value, float).shape
-                self._columns[name] = self._add(name, shape, _meaning(name, meanings), expected)
+                self._columns[name] = self._add(name, shape, meaning_of(name, meanings), expected)
             self.append(snapshot, series)
             self.write()
         return self
@@ -183,7 +144,7 @@ class Recorder:
 
     def append(self, snapshot: Snapshot, series: Mapping[str, Any]) -> None:
         """One output. Arrays are copied: the simulation may go on in the same memory."""
-        rows = _rows(snapshot, series)
+        rows = rows_of(snapshot, series)
         strange = [name for name in rows if name not in self._columns]
         if strange:
             raise ValueError(f"{strange[0]} was not in the first output")
@@ -246,7 +207,10 @@ class Recorder:
 
     def _commit(self) -> None:
         self._open.flush()
+        before = self._file.written_again
         self._file.commit()
+        if self._file.written_again > before:
+            self.notices.append(f"{self.path} was removed or moved while it was being written; it was written again")
 
     def _add(self, name: str, shape: tuple[int, ...], meaning: Meaning, expected: int) -> h5py.Dataset:
         size = 8 * int(np.prod(shape, dtype=int))
@@ -270,7 +234,7 @@ class Recorder:
             compression_opts=1,
             shuffle=True,
         )
-        self._describe(dataset, Meaning(*_FIELDS.get(name, ("1", name))))
+        self._describe(dataset, Meaning(*FIELDS.get(name, ("1", name))))
         dataset.attrs["origin"] = np.asarray(self._grid.origin, float)
         dataset.attrs["spacing"] = np.full(3, self._grid.spacing * self._grid.stride)
         dataset.attrs["index"] = "value[g, i, j, k] lies at origin + spacing*(i, j, k), at time grid/time[g]"
@@ -280,19 +244,9 @@ class Recorder:
         dataset.attrs["description"] = meaning.description
 
 
-def refuse_existing(path: Path, overwrite: bool) -> None:
-    """Raise RunFileError where ``path`` exists and may not be written over."""
-    if not path.exists():
-        return
-    if not overwrite:
-        raise RunFileError(f"{path}: exists already; --force writes over it, --resume goes on with it")
-    if not path.is_file():
-        raise RunFileError(f"{path}: is not a file")
-
-
 def record_end(path: Path, status: str, reason: str) -> None:
     """Note how a run ended whose file could not be written any more; in silence where even that cannot."""
-    with contextlib.suppress(OSError, RuntimeError, KeyError, Busy):
+    with contextlib.suppress(OSError, RuntimeError, KeyError, Busy, Stranger):
         file = JournaledFile(path, journal_path(path))
         try:
             h5 = h5py.File(file, "r+")
@@ -309,14 +263,13 @@ def _writing(path: Path, file: JournaledFile | None = None) -> Iterator[None]:
     """Turn what goes wrong while writing into RunFailed; HDF5 may stumble over what the file hid from it."""
     try:
         yield
-    except (RunFailed, RunFileError):
+    except (RunFailed, RunFileError, Busy, Stranger):
         raise
     except Exception as error:
         cause = (file and file.error) or error
         if not isinstance(cause, OSError):
             raise
-        advice = "write elsewhere with -o" if file is None else "free some space; what was written before is whole"
-        raise RunFailed(f"{path} cannot be written ({cause.strerror or cause})", advice=advice) from error
+        raise failed_write(path, cause, file is not None and file.begun) from error
 
 
 @contextlib.contextmanager
@@ -330,44 +283,10 @@ def _closing(recorder: Recorder) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _begun(path: Path, new: bool) -> Iterator[None]:
-    """Leave nothing behind of a ``new`` file that could not be begun."""
-    try:
-        yield
-    except RunFailed as failure:
-        if new:
-            path.unlink(missing_ok=True)
-            journal_path(path).unlink(missing_ok=True)
-            failure.advice = "free some space, or write elsewhere with -o; nothing was written"
-        raise
-
-
-@contextlib.contextmanager
 def _owned(path: Path) -> Iterator[None]:
     try:
         yield
     except Busy:
         raise RunFileError(f"{path}: is being written by another ibfil that is still running") from None
-
-
-def _rows(snapshot: Snapshot, series: Mapping[str, Any]) -> dict[str, Any]:
-    """Dataset -> value of one output."""
-    rows: dict[str, Any] = {"time": snapshot.time}
-    for name, filament in snapshot.filaments.items():
-        for field in fields_of(filament):
-            value = getattr(filament, field.name)
-            if value is not None:
-                rows[f"filaments/{name}/{field.name}"] = value
-    rows |= {f"observables/{name}": value for name, value in series.items()}
-    return rows | {f"diagnostics/{name}": value for name, value in snapshot.diagnostics.items()}
-
-
-def _meaning(name: str, observables: Mapping[str, Meaning]) -> Meaning:
-    group, _, last = name.rpartition("/")
-    if name == "time":
-        return Meaning("time", "times of the outputs")
-    if group == "observables":
-        return observables[last]
-    if group == "diagnostics":
-        return Meaning(*_DIAGNOSTICS.get(last, ("1", last.replace("_", " "))))
-    return Meaning(*_FILAMENT[last])
+    except Stranger as stranger:
+        raise RunFileError(str(stranger)) from None

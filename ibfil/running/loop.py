@@ -4,74 +4,31 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..errors import Interrupted, RunFailed, Stopped
 from ..io import checkpoint
+from ..io.datasets import Meaning
+from ..io.disk import failed_write
+from ..io.ownership import Stranger
 from ..io.pace import Pace
-from ..io.reader import checkpoint_path
-from ..io.writer import GridPlace, Meaning, Recorder, record_end
-from ..observables.expectations import Check, check
-from ..observables.observers import ObservableSet, Summary
+from ..io.paths import checkpoint_path
+from ..io.writer import GridPlace, Recorder, record_end
+from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
 from .progress import Progress, Signals
+from .result import Result
 from .schedule import SAME, Due, due_times
 
 if TYPE_CHECKING:
-    from ..case.schema import Case
     from ..io.snapshots import Snapshot
     from ..simulation.simulation import Simulation
 
 
 _LOOK = 0.2  # seconds between two looks at clocks and progress
-
-
-@dataclass(frozen=True)
-class Result:
-    """The result of a run. ``status`` is finished, or stopped for the ``reason`` of a stop rule.
-
-    ``snapshot`` is the last output; ``path`` the run file, None where none was written; ``wall_time`` in
-    seconds.
-    """
-
-    case: Case
-    status: str
-    reason: str
-    path: Path | None
-    steps: int
-    wall_time: float
-    snapshot: Snapshot
-    observers: ObservableSet
-
-    def __repr__(self) -> str:
-        found = ", ".join(
-            f"{name} = {np.array2string(np.asarray(one.value), precision=6)}" for name, one in self.summaries.items()
-        )
-        return f"<Result {self.status}: {self.steps} steps, t = {self.snapshot.time:g}; {found or 'no observables'}>"
-
-    @property
-    def times(self) -> np.ndarray:
-        """Times of the outputs (T,)."""
-        return self.observers.times
-
-    def series(self, name: str) -> np.ndarray:
-        """Return an observable's values (T,) or (T, 3)."""
-        return self.observers.series(name)
-
-    @property
-    def summaries(self) -> dict[str, Summary]:
-        """The number of every observable."""
-        return self.observers.summaries()
-
-    @property
-    def checks(self) -> list[Check]:
-        """The case's expectations held against them."""
-        return check(self.case, self.summaries)
 
 
 class Loop:
@@ -190,8 +147,9 @@ class Loop:
 
     def _after_step(self) -> None:
         self._pace.step(self.simulation.time)
-        while self.simulation.notices:
-            self._log(f"warning: {self.simulation.notices.pop(0)}")
+        for told in (self.simulation.notices, self._recorder.notices if self._recorder else []):
+            while told:
+                self._log(f"warning: {told.pop(0)}")
         if self._signals.caught:
             raise Interrupted
         now = clock.monotonic()
@@ -243,11 +201,9 @@ class Loop:
                 ),
             )
         except OSError as error:
-            raise RunFailed(
-                f"{place} cannot be written ({error.strerror or error})",
-                time=simulation.time,
-                advice="free some space; the outputs up to here are in the run file",
-            ) from error
+            raise failed_write(place, error) from error
+        except Stranger as stranger:
+            raise RunFailed(str(stranger), advice="the outputs up to here are in the run file") from None
         self._good = simulation.time
         self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
 
@@ -265,12 +221,11 @@ class Loop:
         except Interrupted:
             raise
         except RunFailed as failure:
-            self._failed(failure.message if failure.time is None else str(failure))
-            if self._good is not None:
-                place = checkpoint_path(self._path) if self._path else ""
-                more = f"the last good checkpoint is {place}, t = {self._good:.6g}"
-                failure.advice = f"{failure.advice}; {more}" if failure.advice else more
-            raise
+            raise self._of_this_run(failure) from failure.__cause__
+        except MemoryError as error:
+            words = f"not enough memory ({error})" if str(error) else "not enough memory"
+            less = "fewer nodes, cells or threads, or a machine with more; `ibfil check` estimates what is needed"
+            raise self._of_this_run(RunFailed(words, time=self.simulation.time, advice=less)) from error
         except BaseException as error:
             self._failed(f"{type(error).__name__}: {error}")
             raise
@@ -279,6 +234,14 @@ class Loop:
                 self._progress.close()
             if self._recorder is not None:
                 self._recorder.close()
+
+    def _of_this_run(self, failure: RunFailed) -> RunFailed:
+        """The failure, noted in the run file, with where one may go on from."""
+        self._failed(failure.message if failure.time is None else str(failure))
+        if self._good is not None and self._path is not None:
+            more = f"the last good checkpoint is {checkpoint_path(self._path)}, t = {self._good:.6g}"
+            failure.advice = f"{failure.advice}; {more}" if failure.advice else more
+        return failure
 
     def _finished(self, status: str, reason: str) -> Result:
         """Close the run file and remove the checkpoint."""

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
+from ..screen import on_terminal
+
 _LINE_EVERY = 60.0  # seconds at most between two lines
 _TENTHS = 10  # lines of a short run
 
@@ -29,7 +31,7 @@ class Progress:
         self._end, self._log, self._show = end, log, show
         self._began = self._said = clock.monotonic()
         self._tenth = int(_TENTHS * start / end)
-        self._bar = self._make_bar(start) if show and sys.stderr.isatty() else None
+        self._bar = self._make_bar(start) if show and on_terminal() else None
 
     def _make_bar(self, start: float) -> Any:
         from tqdm import tqdm

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case.reading import differences, parse_case, read_case, written
 from ..check.overview import Overview, overview_of
-from ..errors import CaseError
+from ..errors import CaseError, RunFileError
 from ..io import checkpoint, journal
+from ..io.overwriting import RUN, refuse
+from ..io.ownership import is_being_written
+from ..io.paths import checkpoint_path, journal_path
 from ..io.provenance import versions
-from ..io.reader import RunFile, RunFileError, checkpoint_path, journal_path
-from ..io.writer import refuse_existing
+from ..io.reader import RunFile
 from ..observables.base import Observable
 from ..observables.factory import observers
 from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
-from .loop import Loop, Result
+from ..screen import tell
+from .loop import Loop
+from .result import Result
 
 if TYPE_CHECKING:
     from ..case.schema import Case
@@ -35,7 +40,7 @@ def run(
     overwrite: bool = False,
     resume: bool = False,
     progress: bool = True,
-    log: Callable[[str], object] = print,
+    log: Callable[[str], object] = tell,
     observables: Mapping[str, Observable] | None = None,
     laws: Mapping[str, MomentLaw] | None = None,
     build: Build | None = None,
@@ -63,7 +68,8 @@ def run(
         return resume_run(path, case, progress=progress, log=log, observables=observables, build=build, look=look)
     seen = observers(case, observables)
     if path is not None:
-        refuse_existing(path, overwrite)
+        overwrite = overwrite or _holds_no_more_than_its_start(path)
+        refuse(path, RUN, overwrite, case.reads)
     simulation = build(case, "")
     overview = look(simulation)
     for line in _banner(simulation, overview):
@@ -77,7 +83,7 @@ def resume_run(
     overrides: Sequence[str] = (),
     *,
     progress: bool = True,
-    log: Callable[[str], object] = print,
+    log: Callable[[str], object] = tell,
     observables: Mapping[str, Observable] | None = None,
     laws: Mapping[str, MomentLaw] | None = None,
     build: Build | None = None,
@@ -91,7 +97,7 @@ def resume_run(
     CaseError) where there is nothing to go on from.
     """
     path, build = Path(path), build or _builder(laws)
-    if journal.is_being_written(journal_path(path)):
+    if is_being_written(journal_path(path)):
         raise RunFileError(f"{path}: is being written by another ibfil that is still running")
     last = _last_checkpoint(path)
     began = parse_case(last.case, last.file)
@@ -117,6 +123,15 @@ def resume_run(
         log(f"warning: {other}; the rest may differ in the last digits from a run that was not cut")
     log(f"going on with {path} from t = {last.time:.6g}, after {last.outputs} outputs and {last.steps} steps")
     return Loop(simulation, seen, log, progress, rules).go_on(path, last, fields_at)
+
+
+def _holds_no_more_than_its_start(path: Path) -> bool:
+    """Whether it is a run that failed or was killed at its start: nothing in it that the same command does not make."""
+    beside = checkpoint_path(path)
+    with suppress(CaseError, OSError, KeyError, ValueError, RuntimeError), RunFile(path) as found:
+        if found.status in ("failed", "cut") and len(found) <= 1:
+            return not beside.exists() or checkpoint.read(beside).time == 0.0
+    return False
 
 
 def _builder(laws: Mapping[str, MomentLaw] | None) -> Build:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError, Interrupted, RunFailed
+from ..screen import tell
 from .member import Member, Outcome
 from .workers import side_by_side, stop_if_cut
 
@@ -42,7 +43,7 @@ def run_members(
     *,
     jobs: int = 1,
     executor: Executor | None = None,
-    log: Log = print,
+    log: Log = tell,
 ) -> list[Outcome]:
     """Run what is not done, ``jobs`` at a time in processes of one thread each; the outcomes in the order given.
 
@@ -110,15 +111,13 @@ def _run(case: Case, path: Path) -> tuple[str, str]:
     """Run the case, or go on where it was cut; its status and reason."""
     from ..case.reading import parse_case
     from ..io.checkpoint import read
-    from ..io.reader import checkpoint_path
+    from ..io.paths import checkpoint_path
     from ..running.run import run
 
     begun = False
     with contextlib.suppress(CaseError):  # no checkpoint, or one that cannot be read
         last = read(checkpoint_path(path))
         begun = path.exists() and not _differing(parse_case(last.case, last.file), case)
-    if not begun:
-        checkpoint_path(path).unlink(missing_ok=True)
     result = run(case, path, overwrite=True, resume=begun, progress=False, log=stop_if_cut)
     return result.status, result.reason
 
@@ -143,7 +142,8 @@ def _differing(a: Case, b: Case) -> list[str]:
 
 def _standing(member: Member, folder: Path, log: Log) -> Outcome:
     """How far a member is: as its file says, failed where its case is at fault, waiting where there is work to do."""
-    from ..io.reader import RunFile, RunFileError
+    from ..errors import RunFileError
+    from ..io.reader import RunFile
 
     path = folder / f"{member.name}.h5"
     try:

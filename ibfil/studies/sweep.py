@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CaseError
+from ..screen import tell
 from .member import Outcome
 from .members import run_members, work
 from .settings import Axis, Setting, combinations
-from .tables import measured, numbers, study_members, write_csv, write_json
+from .tables import measured, numbers, refuse_strangers, study_members, write_csv, write_json
 
 TABLE, DETAILS = "sweep.csv", "sweep.json"
 
@@ -46,7 +47,7 @@ def sweep(
     *,
     jobs: int = 1,
     executor: Executor | None = None,
-    log: Callable[[str], object] = print,
+    log: Callable[[str], object] = tell,
 ) -> list[Swept]:
     """Run every combination that is not done yet, and write ``folder``/sweep.csv and .json (with versions, machine).
 
@@ -54,11 +55,12 @@ def sweep(
     all combinations are at fault, and Interrupted as `run_members`.
     """
     settings = combinations(axes)
+    refuse_strangers(Path(folder), DETAILS, TABLE)
     outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, log=log)
     rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
     table = [row.row() for row in rows]
-    write_csv(Path(folder) / TABLE, table)
     write_json(Path(folder) / DETAILS, {**measured(), "overrides": list(overrides), "runs": table})
+    write_csv(Path(folder) / TABLE, table)
     return rows
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CaseError
+from ..io.overwriting import replacing
 from .member import Member
 from .settings import Setting, source
 
@@ -66,7 +67,7 @@ def numbers(run: RunFile) -> dict[str, float]:
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows under the union of their columns; numbers with all digits, what is not there empty."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
-    with path.open("w", newline="", encoding="utf-8") as out:
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(columns)
         writer.writerows([_cell(row.get(key)) for key in columns] for row in rows)
@@ -83,9 +84,22 @@ def shown(value: Any, digits: int = 4) -> str:
 
 def write_json(path: Path, message: Mapping[str, Any]) -> None:
     """Write JSON; what is not finite becomes null."""
-    path.write_text(
-        json.dumps(_finite(message), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    text = json.dumps(_finite(message), indent=1, ensure_ascii=False, allow_nan=False)
+    with replacing(path) as part:
+        part.write_text(text + "\n", encoding="utf-8")
+
+
+def refuse_strangers(folder: Path, details: str, *others: str) -> None:
+    """Raise CaseError where a study would write over files that no study wrote: ``details`` says whose they are."""
+    written = [details, *others, *(str(Path(name).with_suffix(".pdf")) for name in others if name.endswith(".png"))]
+    there = [name for name in written if (folder / name).exists()]
+    try:
+        with (folder / details).open(encoding="utf-8") as file:
+            ours = {"date", "versions", "machine"} <= set(json.load(file))
+    except (OSError, ValueError, TypeError, RecursionError):
+        ours = False
+    if there and not ours:
+        raise CaseError([f"{folder / there[0]}: is there, and no study wrote it: it is not replaced; take another -o"])
 
 
 def _finite(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from ..case import library
 from ..case.reading import differences, quick_case, read_case
 from ..errors import CaseError, RunFailed
 from ..observables.expectations import Check, check
+from ..screen import on_terminal, tell
 
 if TYPE_CHECKING:
     from ..case.schema import Case
@@ -26,7 +26,7 @@ class Planned:
     expects: dict[str, Case]
 
 
-def verify(cases: Sequence[str], quick: bool, log: Callable[[str], object] = print) -> int:
+def verify(cases: Sequence[str], quick: bool, log: Callable[[str], object] = tell) -> int:
     """Run the cases (files or shipped names; none: all shipped ones) and say a line for each expectation.
 
     With ``quick`` each expectation is held against the quick form of its case; those whose quick forms are
@@ -89,7 +89,7 @@ def _outcome(one: Planned) -> Iterator[tuple[str, bool, str]]:
     from ..running.run import run
 
     try:
-        result = run(one.case, progress=sys.stderr.isatty(), log=lambda line: None)
+        result = run(one.case, progress=on_terminal(), log=lambda line: None)
     except RunFailed as failure:
         for name in one.expects:
             yield name, False, str(failure).replace("\n", "; ")

@@ -6,16 +6,19 @@ picture.png``.
 
 from __future__ import annotations
 
-import os
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..io.overwriting import replacing
+
 if TYPE_CHECKING:
     from ..io.reader import RunFile
 
 
+_MARK = "# As written, to be told from one that was changed, which is kept: "  # and the sum of all before
 _HEAD = '''# {title}
 # A scene for ParaView 5.11 and later: rods as tubes to scale, coloured by tension{more}.
 # File > Load State ..., or `paraview --state={name}`, or `pvpython {name} picture.png` for a picture of the last time.
@@ -80,7 +83,7 @@ arrow.AmbientColor = arrow.DiffuseColor = [0.35, 0.35, 0.35]
 """
 _TAIL = """
 clock = AnnotateTimeFilter(registrationName="time", Input=run)
-clock.Format = "{clock}"
+clock.Format = {clock}
 letters = Show(clock, view)
 letters.Color = [0.1, 0.1, 0.1]
 letters.FontSize = 18
@@ -99,7 +102,10 @@ if len(sys.argv) > 1 and sys.argv[-1].endswith(".png"):
 
 
 def write_scene(collection: Path, run: RunFile) -> Path:
-    """Write NAME_paraview.py beside NAME.pvd, looking along the direction of least motion; returns its path."""
+    """Write NAME_paraview.py beside NAME.pvd, looking along the direction of least motion; returns its path.
+
+    One that is there and was changed, or is somebody's own, is left as it is.
+    """
     from .camera import viewpoint
 
     path = collection.with_name(f"{collection.stem}_paraview.py")
@@ -126,13 +132,19 @@ def write_scene(collection: Path, run: RunFile) -> Path:
     text += _RODS.format(tension=_labelled("tension", units.force))
     if flow:
         text += _FLOW.format(speed=_labelled("speed", run.units("grid/velocity")))
-    text += _TAIL.replace("{clock}", time.replace('"', "'"))
-    if path.exists() and path.read_text(encoding="utf-8") == text:
+    text += _TAIL.replace("{clock}", repr(time))
+    text += f"{_MARK}{zlib.crc32(text.encode()):08x}\n"
+    if path.exists() and (path.read_bytes() == text.encode() or not _is_as_written(path)):
         return path
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path
+
+
+def _is_as_written(path: Path) -> bool:
+    """Whether a scene is as it was written, which its last line tells: one that a user has changed is left alone."""
+    text, mark, sum_ = path.read_text(encoding="utf-8", errors="replace").rpartition(_MARK)
+    return mark != "" and sum_.strip() == f"{zlib.crc32(text.encode()):08x}"
 
 
 def _labelled(name: str, units: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -15,7 +15,9 @@ import numpy as np
 from ..analysis.meshes import filament_data, rods_of
 from ..analysis.run import Run, open_run
 from ..errors import CaseError
+from ..io.overwriting import BY_ENDING, refuse, replacing
 from ..io.units import label
+from ..screen import tell
 from .annotations import Words, bands, lettered
 from .camera import viewpoint
 from .stage import FLOW, QUANTITIES, TIMES, Frame, Scale, Stage, frame_for, quantity
@@ -50,15 +52,22 @@ class Wish(NamedTuple):
     every: int = 1
 
 
-def render(run: str | Path, output: str | Path, wish: Wish | None = None, log: Callable[[str], object] = print) -> Path:
+def render(
+    run: str | Path,
+    output: str | Path,
+    wish: Wish | None = None,
+    log: Callable[[str], object] = tell,
+    overwrite: bool = False,
+) -> Path:
     """Draw the run file ``run`` into ``output``: .png a picture, .mp4 or .gif a film; returns its path.
 
     Tubes are to scale and coloured by a quantity, the camera stands still, the time is written on each picture. The
-    file is whole or not there. Raises CaseError for wishes that cannot be had, where nothing can be rendered here (it
-    names the packages to install) or films not encoded, and as `ibfil.open`.
+    file is whole or not there. Raises CaseError where it exists and ``overwrite`` is not set, for wishes that cannot be
+    had, where nothing can be rendered here (it names the packages to install) or no film encoded, and as `ibfil.open`.
     """
     wish, path = wish or Wish(), Path(output)
     _check(wish, path)
+    refuse(path, BY_ENDING[path.suffix], overwrite, [Path(run)])
     if not can_render():
         line = f"pictures cannot be rendered here; install the Debian packages {PACKAGES}"
         raise CaseError([f"{path}: {line} (apt-get install libegl1 libgl1-mesa-dri)"])
@@ -207,7 +216,7 @@ def _fastest(run: Run) -> float:
 def _save_picture(path: Path, picture: np.ndarray) -> None:
     from PIL import Image
 
-    with _Replacing(path) as part:
+    with replacing(path) as part:
         Image.fromarray(picture).save(part)
 
 
@@ -227,24 +236,8 @@ def _save_film(
     more = {"duration": 1000 / fps, "loop": 0}
     if path.suffix == ".mp4":
         more = {"fps": fps, "macro_block_size": 2, "quality": 8}
-    with _Replacing(path) as part, imageio.get_writer(part, **more) as film:
+    with replacing(path) as part, imageio.get_writer(part, **more) as film:
         for i, picture in enumerate(pictures, 1):
             film.append_data(picture)
             if i % 50 == 0:
                 log(f"{path}: {i} of {count} pictures")
-
-
-class _Replacing:
-    """Write under a name of its own, which takes the place of ``path`` when it is whole."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._part = path, path.with_name(f"{path.stem}.part{path.suffix}")
-
-    def __enter__(self) -> Path:
-        return self._part
-
-    def __exit__(self, kind: object, *_: Sequence[object]) -> None:
-        if kind is None:
-            os.replace(self._part, self._path)
-        else:
-            self._part.unlink(missing_ok=True)

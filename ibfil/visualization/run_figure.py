@@ -17,10 +17,11 @@ import numpy as np
 from ..analysis import periodic_images
 from ..analysis.energy import elastic_energy
 from ..errors import CaseError
+from ..io.overwriting import BY_ENDING, Kind, replacing
 from ..io.units import label
 from ..observables.base import KINDS
 from ..observables.time_series import trapezoid_weights
-from .style import AXES, COLOURS, STYLE, plane_of_motion, with_units
+from .style import AXES, COLOURS, drawing, literal, plane_of_motion, with_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,12 +44,16 @@ XYZ = COLOURS[:3]  # colours of components, or of filaments
 
 def draw(run: RunFile, path: str | Path) -> None:
     """Draw the run into ``path``; the ending (png, pdf, svg) says how. Raises CaseError for another one."""
-    import matplotlib
+    kind_of(Path(path))
+    with drawing(), replacing(Path(path)) as part:
+        figure(run).savefig(part, dpi=170)
 
-    if Path(path).suffix not in ENDINGS:
+
+def kind_of(path: Path) -> Kind:
+    """The kind of file that a name asks for. Raises CaseError where it ends otherwise."""
+    if path.suffix not in ENDINGS:
         raise CaseError([f"{path}: found a name that does not end in {', '.join(ENDINGS)}"])
-    with matplotlib.rc_context(STYLE):
-        figure(run).savefig(path, dpi=170)
+    return BY_ENDING[path.suffix]
 
 
 def figure(run: RunFile) -> Figure:
@@ -63,7 +68,7 @@ def figure(run: RunFile) -> Figure:
     columns = fig.add_gridspec(1, 2, width_ratios=[1.45, 1])
     left = columns[0].subgridspec(2, 2 if flow else 1, height_ratios=[1.15, 1])
     right = columns[1].subgridspec(len(series), 1)
-    title = textwrap.fill(run.case.title or run.path.name, 100)
+    title = literal(textwrap.fill(run.case.title or run.path.name, 100))
     fig.suptitle(title, x=0.012, ha="left", fontsize=11.5, fontweight="bold")
 
     positions = [np.asarray(arrays["position"]) for arrays in run.filaments.values()]

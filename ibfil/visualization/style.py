@@ -1,12 +1,21 @@
-"""The common style of figures: style, colours and marks, labels with units, the plane that is drawn, files."""
+"""The common style of figures: style, colours and marks, labels with units, the plane that is drawn, files.
+
+Figures look alike wherever they are drawn: with matplotlib's own settings and those here, not with the user's, which
+may ask for what is not there (LaTeX, fonts, a window).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from ..io.overwriting import replacing
+from ..screen import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,11 +35,28 @@ STYLE = {
     "legend.fontsize": 8,
     "lines.linewidth": 1.4,
 }
+_TURN = threading.Lock()  # the settings are those of the process
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Within it figures have this style and no other settings; one thread at a time."""
+    import matplotlib
+
+    kept = {"backend", "backend_fallback", "interactive"}  # of windows, which are none of ours
+    plain = {key: value for key, value in matplotlib.rcParamsDefault.items() if key not in kept}
+    with _TURN, matplotlib.rc_context(plain | STYLE):
+        yield
+
+
+def literal(text: str) -> str:
+    """A text of the user's for a figure: a $ in it begins no formula."""
+    return printable(text).replace("$", r"\$")
 
 
 def with_units(name: str, units: str) -> str:
     """A label for an axis: the name, and its units where it has any."""
-    return f"{name} ({units})" if units not in ("", "1") else name
+    return f"{name} ({literal(units)})" if units not in ("", "1") else name
 
 
 def plane_of_motion(positions: Sequence[np.ndarray]) -> tuple[int, int]:
@@ -46,5 +72,6 @@ def plane_of_motion(positions: Sequence[np.ndarray]) -> tuple[int, int]:
 
 def save(fig: Figure, path: Path) -> None:
     """Write a figure as a picture, and beside it as PDF, for papers."""
-    fig.savefig(path, dpi=170)
-    fig.savefig(path.with_suffix(".pdf"))
+    for place in (path, path.with_suffix(".pdf")):
+        with replacing(place) as part:
+            fig.savefig(part, dpi=170)

@@ -12,10 +12,11 @@ extends the collection and never doubles a time.
 from __future__ import annotations
 
 import bisect
+import errno
 import filecmp
-import os
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
@@ -24,7 +25,9 @@ import numpy as np
 
 from ..analysis.meshes import PLAIN, View, box_of, field_data, polylines, rods_of
 from ..errors import CaseError
+from ..io.overwriting import VTK, refuse, replacing
 from ..io.reader import RunFile
+from ..screen import tell
 from .paraview_scene import write_scene
 
 if TYPE_CHECKING:
@@ -41,7 +44,7 @@ def write_vtk(
     wrap: bool = False,
     images: int = 0,
     watch: float | None = None,
-    log: Callable[[str], object] = print,
+    log: Callable[[str], object] = tell,
 ) -> Path:
     """Write the run file ``run`` into ``folder``, by default the run's name; returns the path of the .pvd.
 
@@ -121,24 +124,33 @@ def _keep_common(entries: Entries, times: np.ndarray) -> None:
 
 
 def _save(data: vtkDataSet, path: Path) -> None:
-    """Write one dataset by a temporary name; a file that holds the same bytes already is left untouched."""
+    """Write one dataset; a file that holds the same bytes already is left untouched."""
     from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLPolyDataWriter
 
     writer = vtkXMLPolyDataWriter() if path.suffix == ".vtp" else vtkXMLImageDataWriter()
-    temporary = path.with_name(path.name + ".part")
-    writer.SetFileName(str(temporary))
     writer.SetInputData(data)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
     writer.SetHeaderTypeToUInt64()
     writer.SetCompressorTypeToNone()
-    if not writer.Write():
-        temporary.unlink(missing_ok=True)
-        raise OSError(f"{path}: could not be written; is the disk full?")
-    if path.exists() and filecmp.cmp(temporary, path, shallow=False):
-        temporary.unlink()
-    else:
-        os.replace(temporary, path)
+    with _replacing(path) as part:
+        writer.SetFileName(str(part))
+        if not writer.Write():
+            raise OSError(errno.EIO, "could not be written; is the disk full?", str(path))
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """A name to write a file of VTK to. Raises CaseError where there is one of another kind; the same is left alone."""
+    refuse(path, VTK, True)
+    with suppress(_Same), replacing(path) as part:
+        yield part
+        if path.exists() and filecmp.cmp(part, path, shallow=False):
+            raise _Same
+
+
+class _Same(Exception):
+    """The file is there already."""
 
 
 def _write_collection(path: Path, sources: Sequence[Entries]) -> None:
@@ -150,6 +162,5 @@ def _write_collection(path: Path, sources: Sequence[Entries]) -> None:
             if last >= 0:
                 lines.append(f'<DataSet timestep="{time!r}" part="{part}" file={quoteattr(source[last][1])}/>')
     lines += ["</Collection>", "</VTKFile>", ""]
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text("\n".join(lines), encoding="utf-8")
-    os.replace(temporary, path)
+    with _replacing(path) as whole:
+        whole.write_text("\n".join(lines), encoding="utf-8")

@@ -99,11 +99,11 @@ def test_csv_has_every_value_to_the_last_bit(run, tmp_path):
     with (tmp_path / "made.csv").open(newline="") as file:
         names, *rows = csv.reader(file)
     table = np.array(rows, float)
-    assert set(names) == {"time", "speed", "tip_x", "tip_y", "tip_z"}
-    np.testing.assert_array_equal(table[:, names.index("time")], run.time)
+    assert names == ["time (s)", "speed (um)", "tip_x (um)", "tip_y (um)", "tip_z (um)"]
+    np.testing.assert_array_equal(table[:, 0], run.time)
     for i, axis in enumerate("xyz"):
         tip = np.asarray(run.observables["tip"])[:, i]
-        np.testing.assert_array_equal(table[:, names.index(f"tip_{axis}")], tip)
+        np.testing.assert_array_equal(table[:, names.index(f"tip_{axis} (um)")], tip)
 
 
 def test_table_is_flush_and_drops_empty_columns():

@@ -124,13 +124,73 @@ def test_words_may_stand_before_and_after_options(here, capsys):
 
 
 def test_an_existing_run_is_replaced_only_with_force(here, capsys):
-    (here / "bent.h5").write_bytes(b"precious")
-    assert main.main(["run", "bent.toml"]) == 2
-    assert (here / "bent.h5").read_bytes() == b"precious"
+    assert main.main(["run", "bent.toml"]) == 0
+    before = (here / "bent.h5").read_bytes()
+    assert main.main(["run", "bent.toml", "title=changed"]) == 2
+    assert (here / "bent.h5").read_bytes() == before
     assert "--force" in capsys.readouterr().err
-    assert main.main(["run", "bent.toml", "--force"]) == 0
+    assert main.main(["run", "bent.toml", "title=changed", "--force"]) == 0
     with RunFile("bent.h5") as run:
-        assert run.status == "finished"
+        assert run.case.title == "changed"
+
+
+def test_no_command_writes_over_a_file_of_another_kind_or_one_that_it_reads(here, capsys):
+    """Not with --force either: a case, a run, a picture, notes."""
+    make_run(here / "made.h5")
+    (here / "notes.csv").write_text("date,medium\nMonday,3 mM ATP\n")
+    (here / "notes.png").write_text("no picture")
+    (here / "bent").mkdir()
+    before = {path: path.read_bytes() for path in here.iterdir() if path.is_file()}
+    for words in (
+        ["run", "bent.toml", "-o", "bent.toml"],
+        ["run", "bent.toml", "-o", "notes.csv"],
+        ["show", "made.h5", "--csv", "bent.toml"],
+        ["show", "made.h5", "--csv", "made.h5"],
+        ["show", "made.h5", "--csv", "notes.csv"],
+        ["show", "made.h5", "--plot", "notes.png"],
+        ["render", "made.h5", "-o", "notes.png"],
+    ):
+        for force in ([], ["--force"]):
+            assert main.main([*words, *force]) == 2
+            (line,) = capsys.readouterr().err.splitlines()
+            assert f"{words[-1]}: is " in line
+            assert "--force" not in line
+    (here / "sweep.csv").write_text("date,medium\n")
+    assert main.main(["sweep", "bent.toml", "--vary", "fluid.viscosity=1,2", "-o", "."]) == 2
+    assert "sweep.csv: is there, and no study wrote it" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in before} == before
+    assert {path.name for path in here.iterdir()} == {path.name for path in before} | {"bent", "sweep.csv"}
+
+
+def test_tables_and_pictures_are_replaced_only_with_force(here, capsys):
+    make_run(here / "made.h5")
+    for words in (["--csv", "a.csv"], ["--plot", "a.png"]):
+        assert main.main(["show", "made.h5", *words]) == 0
+        before = (here / words[1]).read_bytes()
+        assert main.main(["show", "made.h5", *words]) == 2
+        assert f"{words[1]}: exists already; --force writes over it" in capsys.readouterr().err
+        assert main.main(["show", "made.h5", *words, "--force"]) == 0
+        assert (words[0] == "--plot") or (here / words[1]).read_bytes() == before
+    (here / "link.csv").symlink_to("a.csv")
+    assert main.main(["show", "made.h5", "--csv", "link.csv", "--force"]) == 0
+    assert (here / "link.csv").is_symlink()
+    assert {path.name for path in here.iterdir()} == {"made.h5", "bent.toml", "a.csv", "a.png", "link.csv"}
+
+
+def test_a_scene_for_paraview_that_was_changed_is_kept(here):
+    make_run(here / "made.h5")
+    assert main.main(["vtk", "made.h5"]) == 0
+    scene = here / "made" / "made_paraview.py"
+    written = scene.read_text()
+    assert main.main(["vtk", "made.h5"]) == 0
+    assert scene.read_text() == written
+    scene.write_text(written.replace("ViewSize = [1280, 960]", "ViewSize = [640, 480]"))
+    assert main.main(["vtk", "made.h5"]) == 0
+    assert "[640, 480]" in scene.read_text()
+    scene.unlink()
+    (here / "made" / "made.pvd").write_text("mine")
+    assert main.main(["vtk", "made.h5"]) == 2
+    assert (here / "made" / "made.pvd").read_text() == "mine"
 
 
 def test_all_faults_are_told_at_once_and_nothing_is_written(here, capsys):
@@ -154,7 +214,7 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(here, capsys):
         (["run", "bent.toml", "-o", "no/such/x.h5"], "no/such/x.h5: there is no folder no/such"),
         (["run", "--resume", "gone.h5"], "gone.h5"),
         (["run", "--resume", "bent.toml", "-o", "x.h5"], "-o"),
-        (["show", "bent.toml"], "is not a run file"),
+        (["show", "bent.toml"], "is a case, not a run file; `ibfil run bent.toml` makes one of it"),
         (["vtk", "gone.h5"], "gone.h5: there is no such file"),
         (["new", "swimmer_stokes", "bent.toml"], "is there already"),
         (["new", "swimmer", "x.toml"], "no shipped case"),
@@ -353,7 +413,7 @@ def test_show_writes_what_it_is_asked_for(here, capsys):
     make_run(here / "made.h5")
     assert main.main(["show", "made.h5", "--json", "--csv", "made.csv", "--plot", "made.pdf"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "Two made filaments"
-    assert (here / "made.csv").read_text().startswith("time,")
+    assert (here / "made.csv").read_text().startswith("time (s),")
     assert (here / "made.pdf").read_bytes().startswith(b"%PDF")
 
 

@@ -18,7 +18,7 @@ from helpers.fake_simulation import case
 from helpers.runs import interrupted, run
 
 from ibfil.commands.main import main
-from ibfil.io.reader import checkpoint_path
+from ibfil.io.paths import checkpoint_path
 
 SECONDS, BYTES = 60, 8 * 2**30
 CASE = """

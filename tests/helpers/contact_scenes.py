@@ -12,7 +12,7 @@ from ibfil.case.reading import parse_case
 from ibfil.case.schema import Case
 from ibfil.rods.neighbour_search import Segments
 from ibfil.running import run as running_run
-from ibfil.running.loop import Result
+from ibfil.running.result import Result
 
 ROD: dict[str, Any] = {"length": 1.0, "bending": 1.0, "stretching": 1000.0, "nodes": 12, "derivative": 2}
 GRID = {"model": "stokes", "box": [2.0, 2.0, 1.0], "cells": [32, 32, 16]}

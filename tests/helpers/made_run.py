@@ -8,8 +8,9 @@ import numpy as np
 
 from ibfil.case.reading import parse_case
 from ibfil.case.schema import Case
+from ibfil.io.datasets import Meaning
 from ibfil.io.snapshots import FilamentSnapshot, Snapshot
-from ibfil.io.writer import GridPlace, Meaning, Recorder
+from ibfil.io.writer import GridPlace, Recorder
 from ibfil.observables.factory import observers
 
 CASE = """

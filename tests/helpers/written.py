@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from helpers.fake_simulation import FakeSimulation, case
+from ibfil.io.datasets import Meaning
 from ibfil.io.snapshots import Snapshot
-from ibfil.io.writer import Meaning, Recorder
+from ibfil.io.writer import Recorder
 
 MEANINGS = {"tip": Meaning("length", "position of the tip")}
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from helpers.written import write
 
+from ibfil.errors import RunFileError
 from ibfil.io import checkpoint
-from ibfil.io.reader import RunFileError, checkpoint_path, journal_path
+from ibfil.io.paths import checkpoint_path, journal_path
 
 
 def some_checkpoint(**more) -> checkpoint.Checkpoint:

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from helpers.written import begin, series, snapshots
 
-from ibfil.errors import RunFailed
+from ibfil.errors import CaseError, RunFailed
 from ibfil.io import journal, writer
-from ibfil.io.journal import Busy, JournaledFile
+from ibfil.io.journal import JournaledFile
+from ibfil.io.ownership import Busy
 from ibfil.io.reader import RunFile
 
 
@@ -117,11 +118,33 @@ def test_a_commit_cut_anywhere_is_the_old_file_or_the_new(tmp_path, monkeypatch,
 def test_a_journal_that_is_not_whole_is_ignored(tmp_path):
     path, side = tmp_path / "f", tmp_path / "j"
     path.write_bytes(b"a" * 10_000)
-    for content in (b"x", b"ibfiljnl", np.random.default_rng(1).bytes(5000)):
+    for content in (b"ibf", b"ibfiljnl", b"ibfiljnl" + np.random.default_rng(1).bytes(5000), bytes(3000)):
         side.write_bytes(content)
         assert journal.recover(path, side) is False
         assert path.read_bytes() == b"a" * 10_000
         assert not side.exists()
+
+
+def test_a_file_of_a_user_beside_a_run_is_not_touched(tmp_path):
+    """A journal or a part that is a link, a pipe, a folder, or has other bytes: refused by name, and as it was."""
+    path, notes = tmp_path / "lab.h5", tmp_path / "notes.txt"
+    notes.write_text("Monday: 3 mM ATP")
+    for name in ("lab.journal", "lab.h5.part", "lab.ckpt.h5", "lab.ckpt.h5.part"):
+        side = tmp_path / name
+        for make in (
+            lambda side: side.write_text("Tuesday: no ATP"),
+            lambda side: side.symlink_to(notes),
+            os.mkfifo,
+            Path.mkdir,
+        ):
+            make(side)
+            with pytest.raises(CaseError, match=rf"{name}: is (there, and no|a folder|not a file)"):
+                begin(path, next(snapshots(1)))
+            assert not path.exists()
+            assert notes.read_text() == "Monday: 3 mM ATP"
+            assert side.is_symlink() or not side.is_file() or side.read_text() == "Tuesday: no ATP"
+            assert sorted(p.name for p in tmp_path.iterdir()) == sorted([name, "notes.txt"])
+            side.rmdir() if side.is_dir() else side.unlink()
 
 
 def test_a_file_is_locked_while_it_is_open(tmp_path):

@@ -13,8 +13,8 @@ import pytest
 from helpers.fake_simulation import FakeSimulation, case
 from helpers.written import begin, series, snapshots, write
 
-from ibfil.errors import CaseError
-from ibfil.io.reader import RunFile, RunFileError
+from ibfil.errors import CaseError, RunFileError
+from ibfil.io.reader import RunFile
 from ibfil.io.writer import GridPlace, Recorder
 
 

@@ -18,7 +18,8 @@ from helpers.runs import HERE, ROD, go_on, interrupted, run
 
 from ibfil.commands.main import main
 from ibfil.errors import CaseError
-from ibfil.io.reader import RunFile, checkpoint_path
+from ibfil.io.paths import checkpoint_path
+from ibfil.io.reader import RunFile
 
 MANY = "output.every=0.002"
 

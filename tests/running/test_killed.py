@@ -17,10 +17,11 @@ import pytest
 from helpers.fake_simulation import ALWAYS, FakeSimulation, case
 from helpers.runs import HERE, content, go_on, interrupted, run, signalling, wait_for
 
-from ibfil.errors import Interrupted
+from ibfil.errors import CaseError, Interrupted
 from ibfil.io import checkpoint
 from ibfil.io import writer as io_writer
-from ibfil.io.reader import RunFile, checkpoint_path, journal_path
+from ibfil.io.paths import checkpoint_path, journal_path
+from ibfil.io.reader import RunFile
 
 
 def killed_over_and_over(path: Path, kills: int, seed: int) -> int:
@@ -146,6 +147,11 @@ def test_a_damaged_file_is_rebuilt_and_it_says_so(path, uncut, damage):
     else:
         path.write_bytes(older.read_bytes())
     said = []
+    if damage == "text":  # no damage, but a file of somebody's
+        with pytest.raises(CaseError, match="is there, and not a run file of ibfil: it is not replaced"):
+            go_on(path, log=said.append)
+        assert path.read_bytes() == b"not a run file\n"
+        return
     result = go_on(path, log=said.append)
     assert any("rebuilt by computing it again" in line for line in said)
     assert result.status == "finished"

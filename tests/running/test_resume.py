@@ -13,9 +13,10 @@ import pytest
 from helpers.fake_simulation import FakeSimulation, case
 from helpers.runs import HERE, SCENES, content, go_on, interrupted, run, signalling
 
-from ibfil.errors import CaseError, Interrupted
+from ibfil.errors import CaseError, Interrupted, RunFileError
 from ibfil.io import checkpoint
-from ibfil.io.reader import RunFile, RunFileError, checkpoint_path
+from ibfil.io.paths import checkpoint_path
+from ibfil.io.reader import RunFile
 
 # --- Ctrl-C, and going on --------------------------------------------------------------------------------------------
 

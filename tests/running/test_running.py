@@ -15,7 +15,8 @@ from helpers.runs import HERE, content, go_on, interrupted, run
 
 from ibfil.errors import CaseError, RunFailed
 from ibfil.io import checkpoint, writer
-from ibfil.io.reader import RunFile, checkpoint_path
+from ibfil.io.paths import checkpoint_path
+from ibfil.io.reader import RunFile
 from ibfil.running import run as running_run
 from ibfil.running.schedule import due_times
 
@@ -193,7 +194,7 @@ def test_a_checkpoint_that_cannot_be_written_fails_the_run(path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", full)
+        patch.setattr(checkpoint, "write", full)
         with pytest.raises(RunFailed, match=r"run\.ckpt\.h5 cannot be written .No space left"):
             run(case(), path)
     with RunFile(path) as file:
@@ -205,8 +206,9 @@ def test_bad_input_writes_nothing(path):
         run(case('[observe.bad]\nkind = "twist"\nat = "centroid"\n'), path)
     assert list(path.parent.iterdir()) == []
     path.write_text("something of the user's")
-    with pytest.raises(CaseError, match="exists already"):
-        run(case(), path)
+    for asked in (False, True):
+        with pytest.raises(CaseError, match="is there, and not a run file of ibfil: it is not replaced"):
+            run(case(), path, overwrite=asked)
     assert path.read_text() == "something of the user's"
 
 

@@ -10,7 +10,7 @@ from ibfil.case.reading import parse_case
 from ibfil.fluids.fields import GridFields
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
-from ibfil.running.loop import Result
+from ibfil.running.result import Result
 from ibfil.running.run import run
 from ibfil.simulation.simulation import Simulation
 

@@ -17,7 +17,8 @@ from helpers.made_run import BENT
 from helpers.runs import content, wait_for
 
 from ibfil.errors import CaseError, Interrupted
-from ibfil.io.reader import RunFile, checkpoint_path
+from ibfil.io.paths import checkpoint_path
+from ibfil.io.reader import RunFile
 from ibfil.running.run import run
 from ibfil.studies import members as module
 from ibfil.studies.member import Member, Outcome

@@ -19,7 +19,8 @@ from helpers.runs import HERE, wait_for
 from ibfil.analysis import meshes
 from ibfil.errors import CaseError
 from ibfil.grid.kernels import KERNELS
-from ibfil.io.reader import RunFile, checkpoint_path
+from ibfil.io.paths import checkpoint_path
+from ibfil.io.reader import RunFile
 from ibfil.visualization import vtk_files
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...screen import tell
 from ...threads import set_threads
 from ..arguments import count, only_changes
 
@@ -51,4 +52,4 @@ def print_table(rows: Sequence[Mapping[str, Any]], left_out: Sequence[str] = ())
     from ...studies.tables import shown
 
     columns = [key for key in dict.fromkeys(key for row in rows for key in row) if key not in left_out]
-    print("\n".join(table([columns, *([shown(row.get(key)) for key in columns] for row in rows)])))
+    tell("\n".join(table([columns, *([shown(row.get(key)) for key in columns] for row in rows)])))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..arguments import log, positive
+from ...screen import tell
+from ..arguments import positive
 from .arguments import add_study, begin
 
 NAME, HELP = "compare", "one scene under several fluids: table, CSV and a figure"
@@ -37,10 +38,10 @@ def do(arguments: argparse.Namespace) -> int:
         period=arguments.period,
         transient=arguments.transient,
         jobs=arguments.jobs,
-        log=log,
+        log=tell,
     )
     _print_comparison(result)
-    print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
+    tell(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     return 0 if all(column.outcome.done for column in result.columns) else 1
 
 
@@ -56,15 +57,15 @@ def _print_comparison(result: Any) -> None:
     names = list(dict.fromkeys(key for column in result.columns for key in column.numbers))
     lines = [["", *(column.fluid for column in result.columns)]]
     lines += [[name, *(cell(column.numbers.get(name)) for column in result.columns)] for name in names]
-    print("\n".join(table(lines)))
+    tell("\n".join(table(lines)))
     window = result.window
-    print(
+    tell(
         f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}; "
         "+- their standard error, from the scatter between these, not that of steps, nodes or cells"
     )
     for column in result.columns:
         for line in column.own or (column.outcome.message or "nothing that the others do not model",):
-            print(f"  {column.fluid}: {line}")
+            tell(f"  {column.fluid}: {line}")
     for column in result.columns:
         for line in column.shares:
-            print(f"  {column.fluid}: {line}")
+            tell(f"  {column.fluid}: {line}")

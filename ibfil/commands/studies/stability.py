@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..arguments import log
+from ...screen import tell
 from .arguments import add_study, add_vary, axes, begin, print_table
 
 NAME, HELP = "stability", "which settings are stable and right: a map, with the predicted limit"
@@ -22,12 +22,12 @@ def do(arguments: argparse.Namespace) -> int:
     varied = axes(arguments.vary)
     from ...studies.stability import study
 
-    result = study.stability(case, varied, folder, changes, jobs=arguments.jobs, log=log)
+    result = study.stability(case, varied, folder, changes, jobs=arguments.jobs, log=tell)
     print_table(study.rows(result), ("message",))
-    print(
+    tell(
         "against a finer run, the largest over outputs: place and shape (without rigid motion), rms of nodes/L; "
         "turn, rad; stretch; force, ratio"
     )
-    print(f"{result.foretold} of {len(result.cells)} as predicted")
-    print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
+    tell(f"{result.foretold} of {len(result.cells)} as predicted")
+    tell(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     return 0

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ...errors import Interrupted, RunFailed
-from ..arguments import log
+from ...screen import tell
 from .arguments import add_study, add_vary, axes, begin, print_table
 
 NAME, HELP = "sweep", "a run for each combination of settings, and a table of all observables"
@@ -27,13 +27,13 @@ def do(arguments: argparse.Namespace) -> int:
     from ...studies import sweep
 
     if arguments.list:
-        print("\n".join(sweep.listing(case, varied, changes)))
+        tell("\n".join(sweep.listing(case, varied, changes)))
         return 0
     if arguments.index is not None:
         return _one(sweep.run_one(case, varied, folder, arguments.index, changes))
-    rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, log=log)
+    rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, log=tell)
     print_table([row.row() for row in rows], ("run", "message"))
-    print(folder / sweep.TABLE)
+    tell(folder / sweep.TABLE)
     return 0 if all(row.outcome.done for row in rows) else 1
 
 
@@ -43,5 +43,5 @@ def _one(outcome: Any) -> int:
         raise Interrupted(f"{outcome.member.name}: {outcome.message}")
     if not outcome.done:
         raise RunFailed(f"{outcome.member.name}: {outcome.status}: {outcome.message}")
-    print(f"{outcome.path}: {outcome.status}")
+    tell(f"{outcome.path}: {outcome.status}")
     return 0

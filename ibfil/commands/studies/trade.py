@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING
 
-from ..arguments import count, duration, log, positive
+from ...screen import tell, warn
+from ..arguments import count, duration, positive
 from .arguments import add_study, add_vary, axes, begin, print_table
 
 if TYPE_CHECKING:
@@ -49,17 +49,17 @@ def do(arguments: argparse.Namespace) -> int:
         clock=arguments.clock,
         budget=arguments.budget,
         jobs=arguments.jobs,
-        log=log,
+        log=tell,
     )
     print_table(study.rows(result), ("message",))
-    print(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
+    tell(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     if arguments.wanted is None:
         return 0
     best = result.cheapest(arguments.wanted)
     if best is None:
         return _none_within(result, arguments.wanted)
-    print(f"the cheapest within {arguments.wanted:g}:")
-    print(*best.setting.overrides)
+    tell(f"the cheapest within {arguments.wanted:g}:")
+    tell(" ".join(best.setting.overrides))
     return 0
 
 
@@ -74,6 +74,6 @@ def _none_within(result: Trade, wanted: float) -> int:
         message += (
             f"; the nearest, {named}, is {result.error(best, worst):.2g} off in {worst}, with the reference's own"
         )
-    print(message, file=sys.stderr)
-    print("ibfil: what to change: vary other keys, or shorter steps", file=sys.stderr)
+    warn(message)
+    warn("ibfil: what to change: vary other keys, or shorter steps")
     return 1

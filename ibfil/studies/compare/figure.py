@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...visualization.style import AXES, COLOURS, MARKS, STYLE, plane_of_motion, save, with_units
+from ...visualization.style import AXES, COLOURS, MARKS, drawing, literal, plane_of_motion, save, with_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,10 +29,9 @@ _NOISE = 1e-9  # of the largest number: what is left of a rod that rests
 
 def draw(result: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
     """Draw the comparison into ``path``."""
-    import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         fig = Figure(figsize=(9.2, 6.6), layout="constrained")
         panels = fig.subplots(2, 2, gridspec_kw={"width_ratios": [1.15, 1]})
         looks = {name: (COLOURS[i % len(COLOURS)], _LINES[i % len(_LINES)]) for i, name in enumerate(runs)}
@@ -44,7 +43,7 @@ def draw(result: Comparison, runs: Mapping[str, RunFile], path: Path) -> None:
         _numbers(panels[1, 1], result, looks)
         handles, labels = panels[0, 1].get_legend_handles_labels()
         fig.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8.5)
-        fig.suptitle(textwrap.fill(result.title, 100), x=0.012, ha="left", fontsize=10.5, fontweight="bold")
+        fig.suptitle(literal(textwrap.fill(result.title, 100)), x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         for axes, letter in zip(panels.flat, "abcd", strict=True):
             axes.set_title(f"({letter})", loc="left", fontsize=9)
         save(fig, path)

@@ -18,10 +18,11 @@ import numpy as np
 
 from ...errors import CaseError, RunFailed
 from ...io.reader import RunFile
+from ...screen import tell
 from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import source
-from ..tables import measured, numbers, write_csv, write_json
+from ..tables import measured, numbers, refuse_strangers, write_csv, write_json
 from .fluids import fluid_overrides, known_fluids
 from .quantities import Quantity, Window, quantities
 from .results import Column, Comparison
@@ -65,7 +66,7 @@ def compare(
     transient: float | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
-    log: Log = print,
+    log: Log = tell,
 ) -> Comparison:
     """Run the scene under each fluid and write compare.csv, compare.json and compare.png into ``folder``.
 
@@ -74,6 +75,7 @@ def compare(
     Raises CaseError, RunFailed where no run came to an end, Interrupted.
     """
     folder, members = Path(folder), _members(case, overrides, fluids)
+    refuse_strangers(folder, DETAILS, TABLE, FIGURE)
     outcomes = run_members(members, folder, jobs=jobs, executor=executor, log=log)
     if not any(outcome.done for outcome in outcomes):
         raise RunFailed("no fluid's run came to an end: " + "; ".join(outcome.message for outcome in outcomes))
@@ -194,6 +196,6 @@ def details(result: Comparison) -> dict[str, Any]:
 def _write(result: Comparison, folder: Path, runs: Mapping[str, RunFile]) -> None:
     from .figure import draw
 
-    write_csv(folder / TABLE, rows(result))
     write_json(folder / DETAILS, details(result))
+    write_csv(folder / TABLE, rows(result))
     draw(result, runs, folder / FIGURE)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...visualization.style import STYLE, save
+from ...visualization.style import drawing, literal, save
 from .results import CLASSES
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ _WORDS = {"W": "wrong: > 0.05 L away", "T": "turned: > 0.1 rad", "L": "locked: >
 
 def draw(result: Map, path: Path) -> None:
     """Draw the map into ``path``; what varies beyond two axes has a panel each."""
-    import matplotlib
     from matplotlib.figure import Figure
 
     axes = [axis for axis in result.axes if len(axis.values) > 1] or list(result.axes[:1])
@@ -36,7 +35,7 @@ def draw(result: Map, path: Path) -> None:
     others = [axis for axis in axes if axis is not across and axis is not down]
     panels = list(product(*(axis.values for axis in others)))
     columns, lines = len(across.values), len(down.values) if down else 1
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         size = ((1.9 + 0.78 * columns) * len(panels) + 1.6, max(2.6, 1.7 + 0.52 * lines))
         fig = Figure(figsize=size, layout="constrained")
         grid = fig.subplots(1, len(panels), squeeze=False)[0]
@@ -52,7 +51,7 @@ def draw(result: Map, path: Path) -> None:
                 location.set_title(", ".join(f"{key.rsplit('.', 1)[-1]} {text}" for key, text in chosen.items()))
         _legend(fig, result)
         wide = int(9.5 * size[0])
-        fig.suptitle(textwrap.fill(result.title, wide), x=0.012, ha="left", fontsize=10, fontweight="bold")
+        fig.suptitle(literal(textwrap.fill(result.title, wide)), x=0.012, ha="left", fontsize=10, fontweight="bold")
         save(fig, path)
 
 

@@ -25,10 +25,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import CaseError
+from ...screen import tell
 from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import Axis, Setting, combinations
-from ..tables import measured, study_members, write_csv, write_json
+from ..tables import measured, refuse_strangers, study_members, write_csv, write_json
 from .results import Map, MapCell
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def stability(
     *,
     jobs: int = 1,
     executor: Executor | None = None,
-    log: Log = print,
+    log: Log = tell,
 ) -> Map:
     """Run every cell and its finer run; write stability.csv, stability.json and stability.png into ``folder``.
 
@@ -58,6 +59,7 @@ def stability(
     """
     folder, settings = Path(folder), combinations(axes)
     members = study_members(case, overrides, settings)
+    refuse_strangers(folder, DETAILS, TABLE, FIGURE)
     finer, predictions = [], []
     shared: dict[str, Member] = {}  # by the case: cells that differ in nothing it keeps have one, called as the first
     for member in members:
@@ -198,7 +200,7 @@ def rows(result: Map) -> list[dict[str, Any]]:
 def _write(result: Map, folder: Path) -> None:
     from .figure import draw
 
-    write_csv(folder / TABLE, rows(result))
     limits = {"stretch": STRETCH, "force": LOCKED, "turn": TURN, "place": PLACE}
     write_json(folder / DETAILS, {"title": result.title, **result.about, "limits": limits, "cells": rows(result)})
+    write_csv(folder / TABLE, rows(result))
     draw(result, folder / FIGURE)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...visualization.style import COLOURS, MARKS, STYLE, save
+from ...visualization.style import COLOURS, MARKS, drawing, literal, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,17 +22,16 @@ _APART = np.array([0.5, 0.12])  # decades between two texts
 
 def draw(result: Trade, path: Path) -> None:
     """Draw the trade into ``path``."""
-    import matplotlib
     from matplotlib.figure import Figure
 
     measures = result.measures[:MOST]
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         fig = Figure(figsize=(1.2 + 4.3 * len(measures), 4.6), layout="constrained")
         panels = fig.subplots(1, len(measures), sharex=True, squeeze=False)[0]
         groups, along = group(result)
         for axes, measure in zip(panels, measures, strict=True):
             _panel(axes, result, measure, groups, along)
-        title = textwrap.fill(result.title or "error against wall time", 34 * len(measures) + 20)
+        title = literal(textwrap.fill(result.title or "error against wall time", 34 * len(measures) + 20))
         fig.suptitle(title, x=0.012, ha="left", fontsize=10.5, fontweight="bold")
         about = f"{result.about['date']}, ibfil {result.about['versions']['ibfil']}, {result.about['machine']}"
         many = result.about["repeats"]

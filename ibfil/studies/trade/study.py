@@ -20,10 +20,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import CaseError, Interrupted, RunFailed
+from ...screen import tell
 from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import Axis, Setting, combinations, source
-from ..tables import measured, study_members, write_csv, write_json
+from ..tables import measured, refuse_strangers, study_members, write_csv, write_json
 from .reference import NOMINAL, POSITION, Reference, distances, prove
 from .results import Trade, Trial
 
@@ -50,7 +51,7 @@ def trade(
     budget: float | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
-    log: Log = print,
+    log: Log = tell,
 ) -> Trade:
     """Measure every combination of ``axes`` and write trade.csv, trade.json and trade.png into ``folder``.
 
@@ -64,6 +65,7 @@ def trade(
     members = study_members(case, overrides, settings)
     base = Member("case", source(case), tuple(overrides)).resolved()
     asked = _measures(base, observe)
+    refuse_strangers(folder, DETAILS, TABLE, FIGURE)
     nodes = any(key.rsplit(".", 1)[-1] in _SPACE for one in axes for key in one.keys)
 
     with _budget(budget) as left:
@@ -249,6 +251,6 @@ def details(result: Trade) -> dict[str, Any]:
 def _write(result: Trade, folder: Path) -> None:
     from .figure import draw
 
-    write_csv(folder / TABLE, rows(result))
     write_json(folder / DETAILS, details(result))
+    write_csv(folder / TABLE, rows(result))
     draw(result, folder / FIGURE)

@@ -1,0 +1,76 @@
+"""The datasets of a run file: the meaning of each, and what an output adds to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields as fields_of
+from typing import Any, NamedTuple
+
+from .snapshots import Snapshot
+
+# Dataset -> its dimension (units.py) and description.
+_FILAMENT = {
+    "position": ("length", "positions of the nodes, unwrapped"),
+    "velocity": ("length/time", "velocities of the nodes"),
+    "force": ("force", "force of each node on the fluid, reactions of supports included"),
+    "e1": ("1", "first material director at the nodes"),
+    "moment": ("force length", "internal moment at the nodes along e1, e2, e3"),
+    "strain": ("1/length", "strains Omega_1, Omega_2, Omega_3 at the nodes"),
+    "tension": ("force", "tension of the segments between nodes, positive when stretched"),
+    "reaction_start": ("force", "force of the support on the node at s = 0"),
+    "reaction_finish": ("force", "force of the support on the node at s = L"),
+    "torque": ("force length", "twist torque of each node on the fluid, along the tangent"),
+    "spin": ("1/time", "rate at which the first material director turns about the tangent, along it"),
+}
+_DIAGNOSTICS = {
+    "net_force": ("force", "total force on the fluid"),
+    "net_torque": ("force length", "total torque on the fluid"),
+    "stretch_max": ("1", "largest stretch of a segment, length over rest length minus 1"),
+    "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
+    "power": ("force length/time", "power of the nodal forces and twist torques on the fluid"),
+    "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
+    "couple_dissipation": ("force length/time", "the part of it by the couple of flows across the rods' thickness"),
+    "grid_power": ("force length/time", "power of the nodal forces upon the grid's own flow"),
+    "slip_power": ("force length/time", "power lost between nodes and grid: the slip's share"),
+    "contacts": ("1", "pairs of segments in contact"),
+    "first_contact": ("time", "time of the first contact that was warned of; NaN before"),
+    "newton_iterations": ("1", "Newton iterations of the last step"),
+    "steps_shortened": ("1", "steps so far that had to be tried again with a shorter one"),
+    "probe_velocity": ("length/time", "velocity at output.probes"),
+}
+FIELDS = {
+    "velocity": ("length/time", "velocity of the fluid"),
+    "vorticity": ("1/time", "vorticity of the fluid"),
+    "pressure": ("force/length/length", "pressure of the fluid"),
+}
+
+
+class Meaning(NamedTuple):
+    """The meaning of a dataset: its dimension as in units.py, and words."""
+
+    dimension: str
+    description: str
+
+
+def meaning_of(name: str, observables: Mapping[str, Meaning]) -> Meaning:
+    """The meaning of a dataset by its name in the file; ``observables`` have theirs by their own."""
+    group, _, last = name.rpartition("/")
+    if name == "time":
+        return Meaning("time", "times of the outputs")
+    if group == "observables":
+        return observables[last]
+    if group == "diagnostics":
+        return Meaning(*_DIAGNOSTICS.get(last, ("1", last.replace("_", " "))))
+    return Meaning(*_FILAMENT[last])
+
+
+def rows_of(snapshot: Snapshot, series: Mapping[str, Any]) -> dict[str, Any]:
+    """Dataset -> value of one output."""
+    rows: dict[str, Any] = {"time": snapshot.time}
+    for name, filament in snapshot.filaments.items():
+        for field in fields_of(filament):
+            value = getattr(filament, field.name)
+            if value is not None:
+                rows[f"filaments/{name}/{field.name}"] = value
+    rows |= {f"observables/{name}": value for name, value in series.items()}
+    return rows | {f"diagnostics/{name}": value for name, value in snapshot.diagnostics.items()}

@@ -1,0 +1,59 @@
+"""The result of a run: its observables, and how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..observables.expectations import Check, check
+from ..observables.observers import ObservableSet, Summary
+
+if TYPE_CHECKING:
+    from ..case.schema import Case
+    from ..io.snapshots import Snapshot
+
+
+@dataclass(frozen=True)
+class Result:
+    """The result of a run. ``status`` is finished, or stopped for the ``reason`` of a stop rule.
+
+    ``snapshot`` is the last output; ``path`` the run file, None where none was written; ``wall_time`` in
+    seconds.
+    """
+
+    case: Case
+    status: str
+    reason: str
+    path: Path | None
+    steps: int
+    wall_time: float
+    snapshot: Snapshot
+    observers: ObservableSet
+
+    def __repr__(self) -> str:
+        found = ", ".join(
+            f"{name} = {np.array2string(np.asarray(one.value), precision=6)}" for name, one in self.summaries.items()
+        )
+        return f"<Result {self.status}: {self.steps} steps, t = {self.snapshot.time:g}; {found or 'no observables'}>"
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the outputs (T,)."""
+        return self.observers.times
+
+    def series(self, name: str) -> np.ndarray:
+        """Return an observable's values (T,) or (T, 3)."""
+        return self.observers.series(name)
+
+    @property
+    def summaries(self) -> dict[str, Summary]:
+        """The number of every observable."""
+        return self.observers.summaries()
+
+    @property
+    def checks(self) -> list[Check]:
+        """The case's expectations held against them."""
+        return check(self.case, self.summaries)
