@@ -77,7 +77,7 @@ def open_hdf5(path: Path) -> Opened:
 
 
 def open_run_file(path: Path) -> tuple[Opened, dict[str, int]]:
-    """A run file, and the rows of its datasets by name. What a killed writer left is put right before.
+    """A run file, and the rows of its datasets by name. Bytes that a killed writer left are put right before.
 
     Raises RunFileError, with one line, for what is not there, is no run file, is of another format or is damaged, or
     has in it what no run file has.

@@ -114,8 +114,8 @@ def go_on(path, *given, build=FakeSimulation, log=quiet, **more):
     return running_run.resume_run(path, *given, build=build, look=look, progress=False, log=log, **more)
 
 
-def signalling(build, step: int, number: int = signal.SIGINT):
-    """Makes simulations that send this process a signal after a step."""
+def meddling(build, step: int, meddle):
+    """Makes simulations during which ``meddle`` is called, after a step."""
 
     def make(*given):
         simulation = build(*given)
@@ -124,7 +124,7 @@ def signalling(build, step: int, number: int = signal.SIGINT):
         def advance(until, after_step):
             def counted():
                 if simulation.steps == step:
-                    os.kill(os.getpid(), number)
+                    meddle()
                 after_step()
 
             inner(until, counted)
@@ -133,6 +133,11 @@ def signalling(build, step: int, number: int = signal.SIGINT):
         return simulation
 
     return make
+
+
+def signalling(build, step: int, number: int = signal.SIGINT):
+    """Makes simulations that send this process a signal after a step."""
+    return meddling(build, step, lambda: os.kill(os.getpid(), number))
 
 
 def content(path: Path) -> dict[str, tuple]:

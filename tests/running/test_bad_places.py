@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers.fake_simulation import ALWAYS, FakeSimulation, case, look
 from helpers.made_run import BENT
-from helpers.runs import content, go_on, real, run
+from helpers.runs import content, go_on, meddling, real, run
 
 from ibfil.case.reading import read_case
 from ibfil.errors import CaseError, RunFailed
@@ -20,27 +20,6 @@ from ibfil.io.reader import RunFile
 from ibfil.running import run as running
 
 SHORT = (ALWAYS, "time.end=0.12")
-
-
-def meddling(step: int, meddle):
-    """Makes fake simulations during which ``meddle`` is called, after a step."""
-
-    def make(*given):
-        simulation = FakeSimulation(*given)
-        inner = simulation.advance
-
-        def advance(until, after_step):
-            def counted():
-                if simulation.steps == step:
-                    meddle()
-                after_step()
-
-            inner(until, counted)
-
-        simulation.advance = advance
-        return simulation
-
-    return make
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +42,9 @@ def test_a_run_whose_file_was_taken_away_is_written_again_and_that_is_told(tmp_p
 
     run(case("", *SHORT), whole)
     given = case("", *SHORT)
-    result = running.run(given, path, build=meddling(22, meddle), look=look, progress=False, log=said.append)
+    result = running.run(
+        given, path, build=meddling(FakeSimulation, 22, meddle), look=look, progress=False, log=said.append
+    )
     assert result.status == "finished"
     assert any("was removed or moved while it was being written; it was written again" in line for line in said)
     assert content(path) == content(whole)
@@ -80,7 +61,7 @@ def test_a_run_whose_file_another_took_the_place_of_fails_and_leaves_that_alone(
         path.write_text("mine")
 
     with pytest.raises(RunFailed, match="another file was put in its place") as failed:
-        run(case("", *SHORT), path, build=meddling(22, meddle))
+        run(case("", *SHORT), path, build=meddling(FakeSimulation, 22, meddle))
     assert "leave the run file and its folder where they are" in str(failed.value)
     assert path.read_text() == "mine"
 
@@ -89,7 +70,7 @@ def test_a_run_whose_folder_is_gone_says_so(tmp_path):
     path = tmp_path / "here" / "run.h5"
     path.parent.mkdir()
     with pytest.raises(RunFailed, match=r"run\.h5 cannot be written \(No such file or directory\)"):
-        run(case("", *SHORT), path, build=meddling(22, lambda: path.parent.rename(tmp_path / "there")))
+        run(case("", *SHORT), path, build=meddling(FakeSimulation, 22, lambda: path.parent.rename(tmp_path / "there")))
     with RunFile(tmp_path / "there" / "run.h5") as file:
         assert len(file) > 1
 
@@ -97,7 +78,7 @@ def test_a_run_whose_folder_is_gone_says_so(tmp_path):
 def test_a_file_cut_short_while_it_is_written_is_an_error_and_no_endless_loop(tmp_path):
     path = tmp_path / "run.h5"
     with pytest.raises(RunFailed, match="it was cut short by another program while it was being written") as failed:
-        run(case("", *SHORT), path, build=meddling(22, lambda: os.truncate(path, 100)))
+        run(case("", *SHORT), path, build=meddling(FakeSimulation, 22, lambda: os.truncate(path, 100)))
     assert "the last good checkpoint is" in str(failed.value)
     said = []
     assert go_on(path, log=said.append).status == "finished"

@@ -63,9 +63,8 @@ def trade(
     """
     folder, settings = Path(folder), combinations(axes)
     members = study_members(case, overrides, settings)
-    base = Member("case", source(case), tuple(overrides)).resolved()
+    base = _base(case, overrides, folder)
     asked = _measures(base, observe)
-    refuse_strangers(folder, DETAILS, TABLE, FIGURE)
     nodes = any(key.rsplit(".", 1)[-1] in _SPACE for one in axes for key in one.keys)
 
     with _budget(budget) as left:
@@ -90,6 +89,12 @@ def trade(
     result = Trade(base.title, reference, measures, trials, fronts, about)
     _write(result, folder)
     return result
+
+
+def _base(case: str, overrides: Sequence[str], folder: Path) -> Case:
+    """The case that settings vary. Raises CaseError, also where results would take the place of other files."""
+    refuse_strangers(folder, DETAILS, TABLE, FIGURE)
+    return Member("case", source(case), tuple(overrides)).resolved()
 
 
 def _measures(base: Case, observe: Sequence[str]) -> tuple[str, ...]:
