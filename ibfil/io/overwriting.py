@@ -30,7 +30,7 @@ class Kind(NamedTuple):
 
 
 def _format(path: Path) -> str:
-    """What an HDF5 file says it is; "" where it says nothing, or nothing can be read."""
+    """The format that an HDF5 file names; "" where it names none, or nothing can be read."""
     with suppress(OSError, RuntimeError, KeyError, ValueError, TypeError, RunFileError):
         opened = open_hdf5(path)
         try:
