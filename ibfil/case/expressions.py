@@ -15,6 +15,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -258,7 +259,9 @@ def _name(name: str, variables: Sequence[str], parameters: Parameters) -> Tree:
         raise ExpressionError(f"{name} is a function, so it needs brackets after it")
     if name in VARIABLES:
         raise ExpressionError(f"{name} has no meaning here")
-    raise ExpressionError(f"unknown name '{name}'" + suggestion(name, {*variables, *parameters, *CONSTANTS}))
+    known = [*variables, *CONSTANTS, *islice(parameters, 100)]
+    hint = suggestion(name, known) or f"; there are {', '.join(known[:20])}"
+    raise ExpressionError(f"unknown name '{name[:100]}'{hint}")
 
 
 def _check_call(name: str, count: int, names: set[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Sequence
+from functools import cache
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
@@ -135,30 +136,66 @@ def known_keys(entry: Entry) -> list[str]:
     return list(dict.fromkeys(key for table in tables for key in keys(table)))
 
 
+# What keys are called elsewhere, and here: in the table of the key, or in another.
+_ELSEWHERE = {
+    **dict.fromkeys(("dt", "timestep", "time_step"), "step"),
+    **dict.fromkeys(("duration", "t_end", "tmax", "T"), "end"),
+    **dict.fromkeys(("tol", "rtol"), "tolerance"),
+    **dict.fromkeys(("base", "root", "clamp"), "start"),
+    **dict.fromkeys(("tip", "stop"), "finish"),
+    **dict.fromkeys(("E", "EI", "B", "A", "bending_modulus", "stiffness"), "bending"),
+    **dict.fromkeys(("EA", "ks", "stretch"), "stretching"),
+    **dict.fromkeys(("GJ", "C", "torsion", "twist_modulus"), "twisting"),
+    **dict.fromkeys(("eta", "mu", "nu"), "viscosity"),
+    **dict.fromkeys(("rho",), "density"),
+    **dict.fromkeys(("L", "l"), "length"),
+    **dict.fromkeys(("N", "n", "points", "segments"), "nodes"),
+    **dict.fromkeys(("a", "diameter"), "radius"),
+    **dict.fromkeys(("domain", "size"), "box"),
+    **dict.fromkeys(("grid", "resolution"), "cells"),
+    **dict.fromkeys(("kT", "kBT", "temperature"), "energy"),
+    **dict.fromkeys(("gravity", "g"), "weight"),
+    **dict.fromkeys(("kappa", "kappa0"), "curvature"),
+    **dict.fromkeys(("interval", "dt_out"), "every"),
+}
+_LONGEST = 60  # letters of a key that is shown, or held against others
+
+
 def unknown_key(parent: Entry, path: Path) -> Fault:
     """The fault of the unknown key ``path`` in the table ``parent``; the nearest name is in ``reads``."""
     name, known = str(path[-1]), known_keys(parent)
-    hint = suggestion(name, known)
+    elsewhere = _ELSEWHERE.get(name, "")
+    hint = f'; did you mean "{elsewhere}"?' if elsewhere in known else ""
+    if not hint and len(name) <= _LONGEST:
+        hint = suggestion(name, known)
     if not hint:
         whole = entry_of(path)  # the union of which ``parent`` is the chosen member
-        where = places(name)
+        where = places(name) or places(elsewhere)
         if whole is not None:
             hint = f"; {name} belongs to another kind"
         elif where:
-            hint = f"; {name} belongs in {' or '.join(where)}"
-    near = hint.split('"')[1:2] if '"' in hint else []
+            hint = f"; {name if places(name) else elsewhere} belongs in {' or '.join(where)}"
+    near = hint.split('"')[1:2] if "did you mean" in hint else []
     allowed = ", ".join(known) if known else describe(parent.hint, parent.metadata)
-    return Fault(dotted(path), f"an unknown key{hint}", allowed, tuple(dotted((*path[:-1], key)) for key in near))
+    cut = path if len(name) <= _LONGEST else (*path[:-1], f"{name[:_LONGEST]} ...")
+    return Fault(dotted(cut), f"an unknown key{hint}", allowed, tuple(dotted((*path[:-1], key)) for key in near))
 
 
 def places(name: str) -> list[str]:
-    """The tables, as paths with NAME, in which a key ``name`` is known."""
-    found = []
+    """The tables, as paths with NAME, in which a key ``name`` is known; a few of them."""
+    return [place for place in _places().get(name, ()) if place != "[]"][:3]
+
+
+@cache
+def _places() -> dict[str, list[str]]:
+    """The tables in which each key of the schema is known."""
+    found: dict[str, list[str]] = {}
 
     def look(entry: Entry, path: tuple[str, ...]) -> None:
-        if name in known_keys(entry):
-            found.append(f"[{'.'.join(path)}]")
         for key in known_keys(entry):
+            here = found.setdefault(key, [])
+            if (place := f"[{'.'.join(path)}]") not in here:
+                here.append(place)
             inner = step_into(entry, key)
             if inner is None:
                 continue
@@ -169,7 +206,7 @@ def places(name: str) -> list[str]:
                 look(inner, (*path, key))
 
     look(ROOT, ())
-    return [place for place in dict.fromkeys(found) if place != "[]"][:3]
+    return found
 
 
 class Found(NamedTuple):
@@ -180,9 +217,9 @@ class Found(NamedTuple):
     missing: bool
 
 
-def found_by_pydantic(error: ValidationError, raw: dict[str, Any]) -> list[Found]:
-    """The faults in the order of the schema, each once."""
-    results = [_translate(item, raw) for item in error.errors(include_url=False, include_input=False)]
+def found_by_pydantic(error: ValidationError, raw: dict[str, Any], most: int) -> list[Found]:
+    """The faults in the order of the schema, each once; ``most`` of them."""
+    results = [_translate(item, raw) for item in error.errors(include_url=False, include_input=False)[:most]]
     return list(dict.fromkeys(results))
 
 

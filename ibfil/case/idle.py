@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from .fluid import Coefficients, Matched
-from .overrides import load
 from .schema import Case
+from .toml import load
 
 
 def idle_keys(case: Case) -> list[str]:

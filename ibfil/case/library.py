@@ -55,7 +55,7 @@ def named(name: str) -> Path:
         return known[name]
     if Path(name).is_dir():
         raise CaseError([f"{name}: is a folder; allowed: a case file, or the name of a shipped case"])
-    near = difflib.get_close_matches(name, known, n=1)
+    near = [f"{name}.toml"] if Path(f"{name}.toml").is_file() else difflib.get_close_matches(name[:100], known, n=1)
     hint = f"did you mean '{near[0]}'? " if near else ""
     raise CaseError([f"{name}: no such file, and no shipped case of that name; {hint}`ibfil cases` lists them"])
 

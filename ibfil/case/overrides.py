@@ -1,37 +1,16 @@
-"""TOML read within limits, and KEY=VALUE on the command line: one key of a case replaced, by its dotted path."""
+"""KEY=VALUE on the command line: one key of a case replaced, by its dotted path."""
 
 from __future__ import annotations
 
 import copy
-import re
-import tomllib
 from typing import Any, get_origin
 
 from .expressions import suggestion
 from .faults import ROOT, Entry, Fault, dotted, members, shown, step_into, unknown_key
+from .toml import load
 
-MAX_DEPTH = 16  # of tables and lists in each other
-_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""  # of a dotted key
-_LONG_KEY = re.compile(rf"(?:{_PART}\s*\.\s*){{{MAX_DEPTH}}}")
-NAMED = ("filament", "observe", "expect")  # tables whose names are the user's
+NAMED = {"filament": "rod", "observe": "tip", "expect": "tip"}  # tables whose names are the user's, and such a name
 FORM = "KEY=VALUE, KEY a dotted path such as fluid.viscosity or stop.0.below"
-
-
-def load(text: str) -> dict[str, Any]:
-    """The content of a TOML text. Raises ValueError: not TOML, or nested deeper than any case is."""
-    if _LONG_KEY.search(text):  # tomllib takes minutes over keys of many thousand parts
-        raise ValueError(f"a key of more than {MAX_DEPTH} parts")
-    try:
-        content = tomllib.loads(text)
-    except RecursionError:
-        raise ValueError("nested too deeply") from None
-    layer: list[Any] = [content]
-    for _ in range(MAX_DEPTH):
-        inner = [entry.values() if isinstance(entry, dict) else entry for entry in layer]
-        layer = [value for values in inner for value in values if isinstance(value, dict | list)]
-    if layer:
-        raise ValueError("nested too deeply")
-    return content
 
 
 def split(text: str) -> tuple[list[str], Any] | Fault:

@@ -25,12 +25,16 @@ from .expressions import (
     Parameters,
     parse,
 )
-from .faults import Fault, Found, dotted, example, found_by_pydantic, shown
-from .overrides import apply, load, split
+from .faults import Fault, Found, dotted, entry_of, example, found_by_pydantic, known_keys, shown
+from .overrides import NAMED, apply, split
 from .schema import Case, Scene
+from .toml import load
 from .values import keys
 
 MAX_BYTES = 1_000_000
+MAX_FAULTS = 100  # told at once
+MAX_QUICK = 50  # quick forms
+_HDF5 = b"\x89HDF"  # as every run file begins
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 _NUMBERS = ("value", "range", "tolerance", "absolute")  # of [expect.NAME], which its quick form may replace
 
@@ -39,11 +43,15 @@ def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     """The case in the file ``path``, with ``KEY=VALUE`` overrides. Raises CaseError, one line a fault."""
     try:
         with Path(path).open("rb") as file:
-            text = file.read(MAX_BYTES + 1).decode("utf-8-sig")
+            content = file.read(MAX_BYTES + 1)
+        text = content.decode("utf-8-sig")
     except OSError as error:
         raise CaseError([f"{path}: cannot be read ({error.strerror})"]) from None
     except UnicodeDecodeError as error:
-        raise CaseError([f"{path}: not a text file (byte {error.start} is not UTF-8)"]) from None
+        found = f"not a text file (byte {error.start} is not UTF-8)"
+        if content.startswith(_HDF5):
+            found = "is an HDF5 file, not a case: `ibfil show` tells of a run, `ibfil run --resume` goes on with it"
+        raise CaseError([f"{path}: {found}"]) from None
     return parse_case(text, str(path), overrides)
 
 
@@ -56,13 +64,14 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
     except ValueError as error:
         raise CaseError([f"{name}: not TOML: {error}"]) from None
     raw, faults = _overridden(raw, [split(override) for override in overrides])
-    deprecated = modernise(raw)
+    old = modernise(raw)
     scene, more = _read(raw)
     faults += more
     faults += _quick_faults(raw, more)
     if faults or scene is None:
-        raise CaseError(list(dict.fromkeys(fault.line(name) for fault in faults)))
-    return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name, deprecated=tuple(deprecated))
+        told = list(dict.fromkeys(fault.line(name) for fault in faults))
+        raise CaseError(told[:MAX_FAULTS] + [f"{name}: more faults follow these"] * (len(told) > MAX_FAULTS))
+    return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name, deprecated=tuple(old))
 
 
 def quick_case(case: Case, name: str) -> Case:
@@ -106,7 +115,9 @@ def _read(raw: dict[str, Any]) -> tuple[Scene | None, list[Fault]]:
     """The scene of the file's content and no faults, or all the faults there are."""
     faults = list(_bad_names(raw))
     parameters = _parameters(raw.get("parameters"), faults)
-    filled = _fill_defaults(raw)
+    filled = copy.deepcopy(raw)
+    faults += _without_names(filled)
+    _fill_defaults(filled)
     if isinstance(raw.get("parameters", {}), dict):
         filled["parameters"] = {key: value for key, value in parameters.items() if value is not None}
     scene, tainted = None, {fault.key for fault in faults}
@@ -116,14 +127,31 @@ def _read(raw: dict[str, Any]) -> tuple[Scene | None, list[Fault]]:
             scene = Scene.model_validate(filled, context=parameters)
             break
         except ValidationError as error:
-            for found in found_by_pydantic(error, filled):
+            for found in found_by_pydantic(error, filled, MAX_FAULTS + 1):
                 if attempt == 0 and found.fault:
                     faults.append(found.fault)
                 tainted.update((dotted(found.path), *(found.fault.reads if found.fault else ())))
                 _prune(filled, found)
+            if error.error_count() > MAX_FAULTS:
+                break
     if scene is not None:
         faults += [fault for fault in check(scene) if not fault.touches(tainted)]
-    return scene, faults
+    meant = {key for fault in faults if "did you mean" in fault.found for key in fault.reads}
+    return scene, [fault for fault in faults if not (fault.found == "nothing" and fault.key in meant)]
+
+
+def _without_names(filled: dict[str, Any]) -> Iterator[Fault]:
+    """Tables that have keys where they have names, [filament] for [filament.NAME]: told once, and left out."""
+    for table in NAMED:
+        entries = filled.get(table)
+        inner = entry_of((table, "name"))
+        if not isinstance(entries, dict) or inner is None or all(isinstance(v, dict) for v in entries.values()):
+            continue
+        loose = [key for key, value in entries.items() if not isinstance(value, dict)]
+        found = f"{', '.join(loose[:3])}{' ...' if loose[3:] else ''} in [{table}] itself"
+        yield Fault(table, found, f"a name of yours for each: [{table}.{NAMED[table]}]")
+        own = {key: entries.pop(key) for key in list(entries) if key in loose or key in known_keys(inner)}
+        entries[NAMED[table]] = own
 
 
 def _bad_names(raw: dict[str, Any]) -> Iterator[Fault]:
@@ -140,6 +168,8 @@ def _parameters(table: Any, faults: list[Fault]) -> Parameters:
     values: dict[str, float | None] = {}
     taken = {*FUNCTIONS, *CONSTANTS, *VARIABLES}
     for name, value in table.items() if isinstance(table, dict) else ():
+        if len(faults) > MAX_FAULTS:
+            break
         key = dotted(("parameters", name))
         if name in taken:
             what = "a function" if name in FUNCTIONS else "pi" if name in CONSTANTS else "a variable"
@@ -159,9 +189,8 @@ def _parameters(table: Any, faults: list[Fault]) -> Parameters:
     return values
 
 
-def _fill_defaults(raw: dict[str, Any]) -> dict[str, Any]:
-    """A copy of the file's content in which the defaults that depend on other tables stand."""
-    filled = copy.deepcopy(raw)
+def _fill_defaults(filled: dict[str, Any]) -> None:
+    """Have the defaults stand in the file's content that depend on other tables."""
 
     def table(*path: str) -> dict[str, Any]:
         """The table of that path, or one that is thrown away where the file has none."""
@@ -186,7 +215,6 @@ def _fill_defaults(raw: dict[str, Any]) -> dict[str, Any]:
     for name in table("expect"):
         if "value" in table("expect", name) and "absolute" not in table("expect", name):
             table("expect", name).setdefault("tolerance", 0.01)
-    return filled
 
 
 def _prune(filled: dict[str, Any], found: Found) -> None:
@@ -235,9 +263,14 @@ def _leaves(table: dict[str, Any], path: tuple[str, ...]) -> Iterator[tuple[list
 def _quick_faults(raw: dict[str, Any], known: Sequence[Fault]) -> Iterator[Fault]:
     """The faults of the quick forms that the case itself has not."""
     entries = raw.get("expect")
-    for name, entry in entries.items() if isinstance(entries, dict) else ():
-        if not (isinstance(entry, dict) and isinstance(entry.get("quick"), dict) and entry["quick"]):
-            continue
+    found = [
+        name
+        for name, entry in (entries.items() if isinstance(entries, dict) else ())
+        if isinstance(entry, dict) and isinstance(entry.get("quick"), dict) and entry["quick"]
+    ]
+    if len(found) > MAX_QUICK:  # each is a case of its own to read
+        yield Fault("expect", f"{len(found)} tables with quick", f"at most {MAX_QUICK}")
+    for name in found[:MAX_QUICK]:
         quick, faults = _quick(raw, name)
         for fault in faults + _read(quick)[1]:
             if fault not in known:
