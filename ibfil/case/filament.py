@@ -212,7 +212,9 @@ class Filament(Table):
         "auto",
         description="what points along direction; auto: axis for helix and relaxed, else tangent (e3(0))",
     )
-    normal: Vector = Field((0.0, 0.0, 1.0), description="e1 at s = 0, made normal to e3")
+    normal: Vector = Field(
+        (0.0, 0.0, 1.0), description="e1 at s = 0, made normal to e3; [0, 1, 0] by default where direction is along z"
+    )
     copies: Copies | None = Field(None, description="many of them, called NAME_000, NAME_001 ...")
     shape: AnyShape = Field(Straight(), description="shape at t = 0")
     start: End = Field(End(), description="the end at s = 0")

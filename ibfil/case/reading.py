@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import CaseError
 from .consistency.scene import check
+from .defaults import fill_defaults
 from .deprecated import modernise
 from .expressions import (
     CONSTANTS,
@@ -117,7 +118,7 @@ def _read(raw: dict[str, Any]) -> tuple[Scene | None, list[Fault]]:
     parameters = _parameters(raw.get("parameters"), faults)
     filled = copy.deepcopy(raw)
     faults += _without_names(filled)
-    _fill_defaults(filled)
+    fill_defaults(filled, parameters)
     if isinstance(raw.get("parameters", {}), dict):
         filled["parameters"] = {key: value for key, value in parameters.items() if value is not None}
     scene, tainted = None, {fault.key for fault in faults}
@@ -187,34 +188,6 @@ def _parameters(table: Any, faults: list[Fault]) -> Parameters:
             why = f" ({error})" if isinstance(value, str) else ""
             faults.append(Fault(key, shown(value) + why, "a number or an expression of earlier parameters"))
     return values
-
-
-def _fill_defaults(filled: dict[str, Any]) -> None:
-    """Have the defaults stand in the file's content that depend on other tables."""
-
-    def table(*path: str) -> dict[str, Any]:
-        """The table of that path, or one that is thrown away where the file has none."""
-        found: Any = filled
-        for part in path:
-            found = found.get(part) if isinstance(found, dict) else None
-        return found if isinstance(found, dict) else {}
-
-    filaments = table("filament")
-    for name in filaments:
-        if "thermal" in filled:
-            table("filament", name).setdefault("derivative", 2)
-        for end in (table("filament", name, "start"), table("filament", name, "finish")):
-            if end.get("end") == "clamped":
-                end.setdefault("twist", "held")
-    table("thermal").setdefault("twist", any("twisting" in table("filament", name) for name in filaments))
-    scheme = table("time").setdefault("scheme", "semi-implicit" if "thermal" in filled else "implicit")
-    table("time").setdefault("order", 2 if scheme == "implicit" else 1)
-    for name in table("observe"):
-        if len(filaments) == 1:
-            table("observe", name).setdefault("filament", next(iter(filaments)))
-    for name in table("expect"):
-        if "value" in table("expect", name) and "absolute" not in table("expect", name):
-            table("expect", name).setdefault("tolerance", 0.01)
 
 
 def _prune(filled: dict[str, Any], found: Found) -> None:

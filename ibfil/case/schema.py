@@ -1,8 +1,8 @@
 """Every table and key of a case file, as frozen descriptions: each key with its default and its meaning.
 
 The tables of a filament are in filament.py and shape.py, kinds of value in values.py, checks between keys in
-consistency/. Some defaults depend on other tables: reading.py fills those in
-before it reads, and the text here says so.
+consistency/. Some defaults depend on other tables: defaults.py fills those in
+before a case is read, and the text here says so.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from .values import (
     Vector,
     Whole,
 )
+
+SHORTEST = 1e-12  # of time.end: four digits above the last one of a time
 
 
 class Units(Table):
@@ -59,13 +61,18 @@ class Time(Table):
     step: Annotated[float | Literal["auto"], Number(("auto",), low=0)] = Field("auto", description="time step")
     tolerance: Positive | None = Field(None, description="rms node error / L a unit time: adaptive steps")
     max_steps: Count = Field(1_000_000, description="the run stops with an error after so many steps")
-    min_step: Positive = Field(1e-10, description="the run stops with an error below it")
+    min_step: Positive | None = Field(None, description="the run stops with an error below it; absent: 1e-12 of end")
     scheme: Literal["explicit", "semi-implicit", "implicit"] = Field(
         "implicit", description="how a step is taken; with [thermal] semi-implicit, by default"
     )
     order: Annotated[int, Whole(choices=(1, 2))] = Field(
         2, description="order in time: 2 with implicit only; 1 by default with the others"
     )
+
+    @property
+    def shortest(self) -> float:
+        """The step below which the run stops: by default as many digits of time are left to count it with."""
+        return SHORTEST * self.end if self.min_step is None else self.min_step
 
     @property
     def automatic(self) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from ..assembly import costs
 from ..assembly.fluids.base import Term
 from ..assembly.fluids.immersed import BAND
+from ..simulation.schedule import due_times
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
@@ -59,9 +60,9 @@ def memory(simulation: Simulation) -> dict[str, float]:
 def disk(simulation: Simulation) -> float:
     """Bytes of the run file, at most: fields are compressed."""
     case, n = simulation.case, len(simulation.arclength)
-    outputs = len(case.output.times or ()) or case.time.end / (case.output.every or case.time.end) + 1
-    size = outputs * n * 8.0 * (20 if simulation.system.unknowns == 3 else 26)
+    dues = due_times(case, simulation.grid is not None)
+    size = sum(due.output for due in dues) * n * 8.0 * (20 if simulation.system.unknowns == 3 else 26)
     if simulation.grid is not None and case.output.grid_every is not None:
         points = float(np.prod(np.ceil(simulation.grid.cells / case.output.grid_stride)))
-        size += (case.time.end / case.output.grid_every + 1) * points * 12.0 * len(case.output.fields)
+        size += sum(due.fields for due in dues) * points * 12.0 * len(case.output.fields)
     return size

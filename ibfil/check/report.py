@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,10 @@ import numpy as np
 from ..assembly.fluids.models import fluid_model
 from ..assembly.loads import ALONG, ON_ENDS, named
 from ..case.idle import idle_keys
+from ..observables.factory import observers
+from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
+from ..timestepping.step_control import equal_parts
 from .budget import disk, memory, shares, terms
 from .dimensionless import groups
 from .warnings import warnings
@@ -20,8 +24,10 @@ if TYPE_CHECKING:
 
 
 def report(case: Case) -> str:
-    """The text of `ibfil check`. Raises CaseError where the scene cannot be built."""
+    """The text of `ibfil check`. Raises CaseError where the scene, or what is taken of it, cannot be built."""
+    seen = observers(case)
     simulation = Simulation(case)
+    seen.record(simulation.snapshot())  # as the first output of a run
     parts = [case.title or case.file, ""]
     parts += _section("modelled", modelled(case))
     parts += _section("not modelled", absent(case))
@@ -135,13 +141,19 @@ def _costs(simulation: Simulation) -> list[str]:
     if len(methods) > 1:
         others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
         lines.append(f"seconds a step, from counts: {others}")
-    steps, seconds = case.time.end / simulation.step_length, methods[simulation.method]
+    steps, seconds = foretold_steps(simulation), methods[simulation.method]
     may = "" if fluid.steps_known or not case.time.automatic else "at least "  # see step_lines
-    total = f"{may}about {steps:.0f} steps, {steps * seconds:.2g} s after start-up"
+    total = f"{may}about {steps} steps, {steps * seconds:.2g} s after start-up"
     if case.time.tolerance is not None:
         total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
     lines.append(f"{total}, from counts (within a factor 3)")
     return lines
+
+
+def foretold_steps(simulation: Simulation) -> int:
+    """How many steps of the present length a run takes: they end at each time at which something is due."""
+    times = [due.time for due in due_times(simulation.case, simulation.grid is not None)]
+    return sum(equal_parts(until - since, simulation.step_length) for since, until in pairwise(times))
 
 
 def _steps(simulation: Simulation) -> list[str]:

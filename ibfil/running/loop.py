@@ -19,9 +19,9 @@ from ..io.paths import checkpoint_path
 from ..io.writer import GridPlace, Recorder, record_end
 from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
+from ..simulation.schedule import SAME, Due, due_times
 from .progress import Progress, Signals
 from .result import Result
-from .schedule import SAME, Due, due_times
 
 if TYPE_CHECKING:
     from ..io.snapshots import Snapshot

@@ -153,15 +153,17 @@ class Simulation:
     def _refuse(self, dt: float, reason: str, node: int | None = None) -> None:
         """Raises RunFailed where a step of length dt may not be tried again with half of it."""
         if not self.may_halve(dt):
-            self._fail(failures.unsolved(reason, dt, self.case.time.min_step, node, self._known(dt)))
+            self._fail(failures.unsolved(reason, dt, self.case.time.shortest, node, self._known(dt)))
 
     def may_halve(self, dt: float) -> bool:
         """Whether a step of length dt that failed may be tried with half of it.
 
-        Not with noise: trying again only the steps whose kicks were large would bias them.
+        Not with noise: trying again only the steps whose kicks were large would bias them. Nor a given explicit one: it
+        is above its limit, which is to be told.
         """
         time = self.case.time
-        return 0.5 * dt >= time.min_step and not time.explicit and self.model.noise is None
+        given = time.explicit and time.tolerance is None
+        return 0.5 * dt >= time.shortest and not given and self.model.noise is None
 
     def longest_step(self) -> float:
         """The longest step that the fluid's own motion allows; infinite where the step is given."""

@@ -16,6 +16,7 @@ from .base import State, Step
 
 HELD = 1.3  # a step is kept unless one longer by this would do
 MARGIN = 1.1  # what the fluid's own motion may gain before a step it limits changes
+NEAR = 1e-6  # of a step: it may be longer by so much, where as many fit into the time to an output
 SAFETY = 0.9  # of the step that would err as much as is allowed
 RESTART = 3  # rejections in a row after which the next step looks back at none before it
 
@@ -58,6 +59,11 @@ class StepControl(Protocol):
         """Goes on from what ``state`` gave."""
 
 
+def equal_parts(time: float, length: float) -> int:
+    """How many equal steps no longer than ``length`` make up a time; by a millionth longer is no longer."""
+    return max(1, int(np.ceil(time / length * (1.0 - NEAR))))
+
+
 class FixedStep:
     """Equal steps no longer than ``length``, and than the fluid allows, from one output to the next.
 
@@ -96,7 +102,7 @@ class FixedStep:
         length, old = self.length, state.dt_old
         if limit < MARGIN * length:
             length = old if old <= limit < HELD * MARGIN * old else limit / MARGIN
-        return max(1, int(np.ceil((until - state.time) / length * (1 - 1e-9))))
+        return equal_parts(until - state.time, length)
 
     def judge(self, state: State, step: Step, dt: float) -> Verdict:
         """Every step that could be solved is taken; what made one fail before may be over."""
@@ -175,7 +181,7 @@ class AdaptiveStep:
             self.length = wanted
         if self.length > limit:
             self.length = limit / MARGIN
-        parts = max(1, int(np.ceil(rest / self.length * (1 - 1e-9))))
+        parts = equal_parts(rest, self.length)
         return Proposal(rest / parts, until if parts == 1 else state.time + rest / parts)
 
     def judge(self, state: State, step: Step, dt: float) -> Verdict:

@@ -34,7 +34,7 @@ COMBINATIONS = [
     ([f"{ROD}.spacing=1/q"], f"{ROD}.spacing", "no finite value"),
     ([f"{ROD}.direction=[0, 0, 0]"], f"{ROD}.direction", "not zero"),
     ([f"{ROD}.normal=[0, 0, 0]"], f"{ROD}.normal", "not zero"),
-    ([f"{ROD}.direction=[0, 0, -2]"], f"{ROD}.normal", "parallel to direction"),
+    ([f"{ROD}.direction=[0, 0, -2]", f"{ROD}.normal=[0, 0, 1]"], f"{ROD}.normal", "parallel to direction"),
     ([f"{ROD}.direction=[1, 1, 1]", f"{ROD}.normal=[-3, -3, -3]"], f"{ROD}.normal", "parallel"),
     ([f"{ROD}.copies.seed=1"], f"{ROD}.copies", "neither count nor file"),
     ([f"{ROD}.copies={{count=1, file='a'}}"], f"{ROD}.copies", "count and file"),
@@ -128,7 +128,8 @@ COMBINATIONS = [
     ([*THERMAL, "time.order=2"], "time.order", "implicit"),
     (["time.scheme=explicit", "time.order=2"], "time.order", "implicit"),
     (["time.scheme=semi-implicit", "time.order=2"], "time.order", "implicit"),
-    (["time.step=1e-12"], "time.step", "min_step"),
+    (["time.step=1e-14"], "time.step", "1e-12 of time.end"),
+    (["time.step=1e-6", "time.min_step=1e-5"], "time.step", "min_step"),
     # output
     (["output={}"], "output.every", "a list of times"),
     (["output.times=[0, 1]"], "output.every", "every and times"),

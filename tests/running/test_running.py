@@ -18,7 +18,7 @@ from ibfil.io import checkpoint, writer
 from ibfil.io.paths import checkpoint_path
 from ibfil.io.reader import RunFile
 from ibfil.running import run as running_run
-from ibfil.running.schedule import due_times
+from ibfil.simulation.schedule import due_times
 
 # --- outputs ---------------------------------------------------------------------------------------------------------
 

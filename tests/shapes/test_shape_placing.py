@@ -59,6 +59,19 @@ def test_placing_neither_stretches_nor_mirrors() -> None:
     np.testing.assert_allclose(e1, own_e1 @ motion, atol=1e-12)
 
 
+def test_an_upright_filament_has_a_normal_and_is_that_along_x_turned() -> None:
+    """x -> z, y -> x, z -> y: the first cilium of a user stands, and bends in the x-z plane."""
+    keys = {"curvature": [2, 0], "shape": {"kind": "relaxed"}, "anchor": "start", "align": "tangent"}
+    lying, lying_e1 = initial_shape(rod(**keys))
+    for direction in ([0, 0, 1], [0, "0", "2*1"], [0.0, 0.0, 1.0]):
+        upright, e1 = initial_shape(rod(direction=direction, **keys))
+        np.testing.assert_allclose(upright, lying[:, [1, 2, 0]], atol=1e-12)
+        np.testing.assert_allclose(e1, lying_e1[:, [1, 2, 0]], atol=1e-12)
+    assert np.ptp(lying[:, 1]) > 0.5
+    down, _ = initial_shape(rod(direction=[0, 0, -1], **keys))
+    np.testing.assert_allclose(down[:, 1], 0.0, atol=1e-12)
+
+
 def test_what_cannot_be_placed_is_refused_in_one_line() -> None:
     parallel = rod(direction=[1, 0, 0]).model_copy(update={"normal": (2.0, 0.0, 0.0)})
     assert fault(parallel).startswith("filament.rod.normal: parallel")

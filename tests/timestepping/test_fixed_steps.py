@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ibfil.timestepping.step_control import FixedStep, StepControl, Verdict
+from ibfil.timestepping.step_control import FixedStep, StepControl, Verdict, equal_parts
 
 
 def walked(control: StepControl, before: float, end: float) -> list[float]:
@@ -38,3 +38,11 @@ def test_after_a_short_step_they_grow_to_the_length_asked_for_without_a_short_la
 
 def test_without_a_bound_on_growth_they_are_the_fewest_equal_ones():
     assert walked(FixedStep(0.3), 1e-6, 1.0) == pytest.approx([0.25] * 4)
+
+
+@pytest.mark.parametrize(("length", "count"), [(0.314159265 / 10, 10), (0.25, 4), (0.25 - 2e-7, 4), (0.25 - 1e-6, 5)])
+def test_a_length_that_lacks_a_millionth_of_an_equal_part_is_that_part(length, count):
+    """As many digits of a period as a user writes down are enough."""
+    end = np.pi / 10 if count == 10 else 1.0
+    assert equal_parts(end, length) == count
+    assert walked(FixedStep(length), 0.0, end) == pytest.approx([end / count] * count)

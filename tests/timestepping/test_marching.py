@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.scenes import swimmer
 
 from ibfil.assembly.fluids.navier_stokes import CELLS, crossing
 from ibfil.case.reading import parse_case
@@ -93,6 +94,36 @@ def test_the_error_is_the_tolerance_within_a_factor_of_three(rod, end, tolerance
         error = np.sqrt(np.mean(np.sum((found - reference) ** 2, axis=2), axis=1))
         ratio = float(np.max(error / times)) / tolerance
         assert 1 / 3 < ratio < 3, f"tolerance {tolerance:g}: {ratio:.2g} of it"
+
+
+def test_explicit_steps_follow_a_tolerance():
+    """By first order as long as it asks for less than the limit of stability.
+
+    Above that limit errors grow until a step is not taken, so that some half of it is the most on average.
+    """
+    bent = SWIMMER.replace("nodes = 41", "nodes = 21").replace("1.6e4", "400")
+    end, explicit, steps = 5e-4, "scheme = 'explicit'\n", []
+    fine, _ = _path(bent, end, "tolerance = 1e-4")
+    limit = _simulation(bent, end, explicit).explicit_limit()
+    for tolerance in (1e-2, 4e-2, 10.0):
+        found, simulation = _path(bent, end, f"{explicit}tolerance = {tolerance}")
+        assert np.sqrt(np.mean(np.sum((found[-1] - fine[-1]) ** 2, axis=1))) < tolerance * end
+        steps.append(simulation.steps)
+    assert 2 < steps[0] / steps[1] < 5
+    assert 0.4 * end / limit < steps[2] < 2 * end / limit
+
+
+def test_the_shortest_step_is_in_the_units_of_the_case():
+    """The same swimmer in micrometres and microseconds takes the same steps: none is too short for being small."""
+    steps = []
+    for length, unit in ((1.0, 1.0), (1e-6, 1e-6)):
+        case = swimmer(length=length, viscosity=1e-3 if length < 1 else 1.0, bending=1e-21 if length < 1 else 1.0,
+                       end=0.05, tolerance=1e-3 / unit)  # fmt: skip
+        simulation = Simulation(case)
+        simulation.advance(case.time.end, lambda: None)
+        steps.append(simulation.steps)
+    assert steps[0] == pytest.approx(steps[1], rel=0.2)
+    assert 5 < steps[0] < 200
 
 
 def test_steps_follow_the_square_root_of_the_tolerance():

@@ -214,8 +214,10 @@ def _time(case: Scene) -> Iterator[Fault]:
             '1, or scheme = "implicit"',
             ("time.scheme", "thermal"),
         )
-    if time.step != "auto" and time.step < time.min_step:
-        yield Fault("time.step", f"{time.step:g}", f"at least min_step = {time.min_step:g}", ("time.min_step",))
+    if time.step != "auto" and time.step < time.shortest:
+        default = ", by default 1e-12 of time.end" if time.min_step is None else ""
+        allowed = f"at least min_step = {time.shortest:g}{default}"
+        yield Fault("time.step", f"{time.step:g}", allowed, ("time.min_step", "time.end"))
 
 
 def _output(case: Scene) -> Iterator[Fault]:
