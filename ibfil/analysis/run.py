@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 def open_run(path: str | Path) -> Run:
     """Open the run file ``path`` for reading; close it or use it in a ``with``.
 
-    A run that is still being written can be open at the same time, and shows its outputs so far. Raises RunFileError (a
+    A run that is still being written can be open at the same time, and shows its outputs so far. Several threads may
+    ask one opened run. Raises RunFileError (a
     CaseError), with one line, for what is not there, is no run file, is of another format version or is damaged.
 
     >>> with ibfil.open("run.h5") as run:
@@ -40,7 +42,10 @@ class Run(RunFile):
     ... tell of the run. Units are the case's: ``run.units("filaments/NAME/force")`` has their label.
     """
 
-    _flow: Flow | None = None
+    def __init__(self, path: str | Path) -> None:
+        super().__init__(path)
+        self._flow: Flow | None = None
+        self._turn = threading.Lock()  # of threads that ask for the flow, which is computed in arrays of its own
 
     def __repr__(self) -> str:
         from .summary import listed
@@ -74,14 +79,15 @@ class Run(RunFile):
         >>> u.shape
         (2, 3)
         """
-        if self._flow is None:
-            from .flow import flow_of
-
-            self._flow = flow_of(self)
         wanted = np.atleast_2d(np.asarray(points, float))
         if wanted.ndim != 2 or wanted.shape[1] != 3 or not np.all(np.isfinite(wanted)):
             raise CaseError([f"{self.path}: points: found shape {np.shape(points)}; allowed: (k, 3), finite"])
-        return self._flow.velocity_at(wanted, float(self.time[-1]) if time is None else time)
+        with self._turn:
+            if self._flow is None:
+                from .flow import flow_of
+
+                self._flow = flow_of(self)
+            return self._flow.velocity_at(wanted, float(self.time[-1]) if time is None else time)
 
     def mesh(self, time: float | None = None) -> pyvista.PolyData:
         """All filaments as polylines at the output nearest to ``time``, by default the last, with arrays at the nodes.

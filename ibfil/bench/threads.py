@@ -23,18 +23,17 @@ def rows() -> list[dict]:
     """Velocity evaluations and a step of many filaments, by two threads against one."""
     from dataclasses import asdict
 
-    from threadpoolctl import threadpool_limits
-
     from ..case.reading import parse_case
     from ..fluids.stokes import StokesSolve
     from ..grid.periodic_grid import Grid
     from ..grid.pruned_fft import PrunedSolve
     from ..simulation.simulation import Simulation
+    from ..threads import one_thread_of_blas
     from .many import scene
     from .timing import against, nodes_and_forces
 
     found = []
-    with threadpool_limits(limits=1, user_api="blas"):  # as a run has it (running/loop.py)
+    with one_thread_of_blas():  # as a run has it
         for cells in (64, 128):
             grid = Grid([3.2] * 3, [cells] * 3)
             given = nodes_and_forces(grid, "peskin4", 41)

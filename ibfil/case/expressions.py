@@ -1,15 +1,13 @@
-"""Expressions of a case file: text -> a checked tree -> numbers with ``math`` or arrays with numexpr.
+"""Expressions of a case file: text -> a checked tree -> numbers with ``math``; evaluation.py makes arrays of it.
 
 The text is never evaluated as Python. It is read by the standard ``ast``; every node must be on a short
-list; names of [parameters] become numbers, and what is constant is worked out at once. numexpr, which itself
-evaluates text as Python, is given text written again from the tree, so it sees nothing a user typed.
+list; names of [parameters] become numbers, and what is constant is worked out at once.
 """
 
 from __future__ import annotations
 
 import ast
 import difflib
-import functools
 import math
 import re
 import warnings
@@ -23,11 +21,9 @@ if TYPE_CHECKING:
 
 
 MAX_LENGTH = 2000  # characters
-MAX_NODES = 500  # of the syntax tree: numexpr's 256 registers cannot run out
-MAX_DEPTH = 100  # of the syntax tree: neither this module nor numexpr meets Python's limit of recursion
-MAX_CONSTANTS = 80  # different numbers left in one expression
+MAX_NODES = 500  # of the syntax tree
+MAX_DEPTH = 100  # of the syntax tree: no walk of it meets Python's limit of recursion
 MAX_EXPONENT = 16.0
-MAX_EXPANDED = 2000  # nodes, once numexpr has turned powers into products
 
 VARIABLES = ("s", "t", "x", "y", "z", "q")
 CONSTANTS = {"pi": math.pi}
@@ -55,34 +51,33 @@ def _step(x: float) -> float:
 
 
 class _Function(NamedTuple):
-    """One function: its least and largest number of arguments, its value, its name in numexpr."""
+    """One function: its least and largest number of arguments, its value."""
 
     least: int
     most: int
     value: Callable[..., float]
-    name: str
 
 
 FUNCTIONS: dict[str, _Function] = {
-    "sin": _Function(1, 1, math.sin, "sin"),
-    "cos": _Function(1, 1, math.cos, "cos"),
-    "tan": _Function(1, 1, math.tan, "tan"),
-    "asin": _Function(1, 1, math.asin, "arcsin"),
-    "acos": _Function(1, 1, math.acos, "arccos"),
-    "atan": _Function(1, 1, math.atan, "arctan"),
-    "atan2": _Function(2, 2, math.atan2, "arctan2"),
-    "sinh": _Function(1, 1, math.sinh, "sinh"),
-    "cosh": _Function(1, 1, math.cosh, "cosh"),
-    "tanh": _Function(1, 1, math.tanh, "tanh"),
-    "exp": _Function(1, 1, math.exp, "exp"),
-    "log": _Function(1, 1, math.log, "log"),
-    "sqrt": _Function(1, 1, math.sqrt, "sqrt"),
-    "abs": _Function(1, 1, abs, "abs"),
-    "sign": _Function(1, 1, _sign, "sign"),
-    "min": _Function(2, 8, min, "minimum"),
-    "max": _Function(2, 8, max, "maximum"),
-    "where": _Function(3, 3, lambda chosen, yes, no: yes if chosen else no, "where"),
-    "step": _Function(1, 1, _step, "where"),  # 0 below 0, 1 from 0 on
+    "sin": _Function(1, 1, math.sin),
+    "cos": _Function(1, 1, math.cos),
+    "tan": _Function(1, 1, math.tan),
+    "asin": _Function(1, 1, math.asin),
+    "acos": _Function(1, 1, math.acos),
+    "atan": _Function(1, 1, math.atan),
+    "atan2": _Function(2, 2, math.atan2),
+    "sinh": _Function(1, 1, math.sinh),
+    "cosh": _Function(1, 1, math.cosh),
+    "tanh": _Function(1, 1, math.tanh),
+    "exp": _Function(1, 1, math.exp),
+    "log": _Function(1, 1, math.log),
+    "sqrt": _Function(1, 1, math.sqrt),
+    "abs": _Function(1, 1, abs),
+    "sign": _Function(1, 1, _sign),
+    "min": _Function(2, 8, min),
+    "max": _Function(2, 8, max),
+    "where": _Function(3, 3, lambda chosen, yes, no: yes if chosen else no),
+    "step": _Function(1, 1, _step),  # 0 below 0, 1 from 0 on
 }
 _BINARY: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -127,10 +122,12 @@ class Expression:
     def bind(self, *names: str) -> Callable[..., np.ndarray]:
         """A function of ``names`` in that order: floats or arrays in, a float64 array of their shape out.
 
-        One thread, some microseconds a call for short arrays. Where there is no value (1/0, sqrt(-1)), inf or
-        nan. Raises ValueError if the expression uses a variable that is not among ``names``.
+        Any threads may call it; some microseconds a call for short arrays. Where there is no value (1/0, sqrt(-1)), inf
+        or nan. Raises ValueError if the expression uses a variable that is not among ``names``.
         """
         import numpy as np
+
+        from .evaluation import function_of
 
         if self.variables - set(names):
             raise ValueError(f"{self.text!r} uses {sorted(self.variables)}, bound to {names}")
@@ -138,12 +135,12 @@ class Expression:
             value = self.tree
             return lambda *args: np.full(np.broadcast(*args).shape, value)
         used = tuple(i for i, name in enumerate(names) if name in self.variables)
-        compiled = _compiled(self.tree, tuple(names[i] for i in used))
+        function = function_of(self.tree, tuple(names[i] for i in used))
         if len(used) == len(names):
-            return compiled
+            return function
 
         def partly(*args: Any) -> np.ndarray:
-            value = compiled(*[args[i] for i in used])
+            value = function(*[args[i] for i in used])
             shape = np.broadcast(*args).shape
             return value if value.shape == shape else np.full(shape, value)
 
@@ -161,10 +158,7 @@ def parse(value: str | int | float, variables: Sequence[str] = (), parameters: P
     if not isinstance(value, str):
         return Expression(repr(value), _finite(value), frozenset())
     tree = _fold(_read(_syntax(value), variables, parameters or {}))
-    leaves = list(_leaves(tree))
-    if len({leaf for leaf in leaves if isinstance(leaf, float)}) > MAX_CONSTANTS:
-        raise ExpressionError(f"more than {MAX_CONSTANTS} different numbers")
-    return Expression(value, tree, frozenset(leaf for leaf in leaves if isinstance(leaf, str)))
+    return Expression(value, tree, frozenset(leaf for leaf in _leaves(tree) if isinstance(leaf, str)))
 
 
 def of_tree(tree: Tree) -> Expression:
@@ -340,43 +334,11 @@ def _leaves(tree: Tree) -> Iterator[float | str]:
 
 
 def _text(tree: Tree) -> str:
-    """The tree in numexpr's words, every operation in brackets."""
-    if isinstance(tree, float):
-        return f"({tree!r})"
-    if isinstance(tree, str):
-        return tree
+    """The tree as a text that `parse` reads, every operation in brackets."""
+    if not isinstance(tree, tuple):
+        return tree if isinstance(tree, str) else f"({tree!r})"
     op, *children = tree
     parts = [_text(child) for child in children]
     if op == "neg":
         return f"(-{parts[0]})"
-    if op == "step":
-        return f"where({parts[0]}<0.0,0.0,1.0)"
-    if op in ("min", "max"):  # numexpr's take two
-        return functools.reduce(lambda a, b: f"{FUNCTIONS[op].name}({a},{b})", parts)
-    if op in FUNCTIONS:
-        return f"{FUNCTIONS[op].name}({','.join(parts)})"
-    return f"({parts[0]}{op}{parts[1]})"
-
-
-def _expanded(tree: Tree) -> float:
-    """The nodes of the tree once numexpr has written powers as products, in which it copies the base."""
-    if not isinstance(tree, tuple):
-        return 1.0
-    sizes = [_expanded(child) for child in tree[1:]]
-    if tree[0] == "**":
-        return sizes[0] * max(1.0, abs(tree[2])) + 2.0
-    return sum(sizes) + 1.0
-
-
-@functools.lru_cache(maxsize=256)
-def _compiled(tree: Tree, names: tuple[str, ...]) -> Callable[..., np.ndarray]:
-    """The function numexpr makes of ``names``, all of which the tree uses."""
-    import numexpr
-    import numpy as np
-
-    numexpr.set_num_threads(1)  # arrays here are short, and threads are asked for elsewhere
-    few = _expanded(tree) <= MAX_EXPANDED  # powers of powers of powers would grow without limit
-    function: Callable[..., np.ndarray] = numexpr.NumExpr(
-        _text(tree), [(name, np.float64) for name in names], optimization="aggressive" if few else "none"
-    )
-    return function
+    return f"{op}({', '.join(parts)})" if op in FUNCTIONS else f"({parts[0]}{op}{parts[1]})"

@@ -70,7 +70,7 @@ def _sentence(text: str, error: str) -> str:
 
 
 def _hint(line: str) -> str:
-    """What to write in place of a line that is at fault; "" where that is not known."""
+    """A hint at what was meant by a line that is at fault; "" where that is not known."""
     _, equals, value = line.partition("=")
     if not equals:
         return ""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..grid.fft import VectorTransform
+from ..grid.fft import ESTIMATED, VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import curl
 from .advection import filters
@@ -48,7 +48,7 @@ class Background:
     def _filtered(self, velocity: np.ndarray) -> np.ndarray:
         """Velocity and vorticity of a velocity at the grid's points (k, 3)."""
         nx, ny, nz = (int(n) for n in self._grid.cells)
-        transform = VectorTransform((nx, ny, nz), self._threads, "FFTW_ESTIMATE", FIELDS)
+        transform = VectorTransform((nx, ny, nz), self._threads, ESTIMATED, FIELDS)
         transform.real[:3] = velocity.T.reshape(3, nx, ny, nz)
         fx, fy, fz = filters(self._grid)
         modes = transform.forward()

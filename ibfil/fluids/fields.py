@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..grid.fft import VectorTransform
+from ..grid.fft import ESTIMATED, VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import half_curl, project
 from ..grid.spreading import interpolate, spread
@@ -24,7 +24,7 @@ class GridFields:
     def __init__(self, grid: Grid, viscosity: float, flow: Flow | None, threads: int = 1) -> None:
         self.grid, self.viscosity, self.flow = grid, viscosity, flow
         nx, ny, nz = (int(n) for n in grid.cells)
-        self._transform = VectorTransform((nx, ny, nz), threads, "FFTW_ESTIMATE")
+        self._transform = VectorTransform((nx, ny, nz), threads, ESTIMATED)
         (kx, ky, kz), self._squares = grid.wave_numbers()
         self._k = (kx[:, None, None], ky[None, :, None], kz[None, None, :])
         self._axes = (kx, ky, kz)

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..grid.fft import VectorTransform
+from ..grid.fft import MEASURED, VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import project
 from ..grid.spreading import interpolate, spread
@@ -50,7 +50,7 @@ class StokesSolve:
         grid: Grid,
         viscosity: float,
         threads: int = 1,
-        planning: str = "FFTW_MEASURE",
+        planning: str = MEASURED,
         alpha: float = 0.0,
         transform: VectorTransform | None = None,
     ) -> None:

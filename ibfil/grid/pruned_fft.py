@@ -19,7 +19,7 @@ import numpy as np
 import pyfftw
 from numba import njit
 
-from .fft import useful_threads
+from .fft import ESTIMATED, plan, useful_threads
 from .periodic_grid import Grid
 from .spectral import StokesSymbol, project
 from .spreading import interpolate, spread
@@ -123,11 +123,8 @@ class _Passes:
 
 
 def _plan(source: np.ndarray, to: np.ndarray, axis: int, direction: str, threads: int) -> pyfftw.FFTW:
-    flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT")
-    threads = useful_threads(source.size, threads)
-    return pyfftw.FFTW(
-        source, to, axes=(axis,), direction=direction, flags=flags, threads=threads, planning_timelimit=20.0
-    )
+    """Estimated: the box changes as rods move, and to measure its plans anew would take longer than they gain."""
+    return plan(source, to, (axis,), direction, useful_threads(source.size, threads), ESTIMATED)
 
 
 class _Planes:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pyfftw
 
-from .fft import modes_of, useful_threads
+from .fft import modes_of, plan, useful_threads
 from .pruned_fft import run_of_cells
 from .spreading import Stencil, interpolate, spread
 
@@ -72,11 +72,7 @@ class SlabFFT:
         self._lines = cache(self._make_lines)
 
     def _plan(self, source: np.ndarray, to: np.ndarray, axes: tuple[int, ...], direction: str) -> pyfftw.FFTW:
-        flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT")
-        threads = useful_threads(source.size, self._threads)
-        return pyfftw.FFTW(
-            source, to, axes=axes, direction=direction, flags=flags, threads=threads, planning_timelimit=20.0
-        )
+        return plan(source, to, axes, direction, useful_threads(source.size, self._threads))
 
     def _make_lines(self, axis: int) -> tuple[np.ndarray, pyfftw.FFTW, pyfftw.FFTW]:
         """Room for a block of lines along ``axis``, as many as divide the grid, and their transforms."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import stat
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -113,7 +114,7 @@ def replacing(path: Path) -> Iterator[Path]:
     A link is followed. Raises OSError, with the name of ``path``, where it cannot be written.
     """
     place = Path(os.path.realpath(path))
-    part = place.with_name(f"{place.stem}.part{os.getpid()}{place.suffix}")
+    part = place.with_name(f"{place.stem}.part{os.getpid()}_{threading.get_ident()}{place.suffix}")
     if place.exists() and not place.is_file():  # a terminal, a pipe
         yield place
         return

@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from threadpoolctl import threadpool_limits
-
 from ..errors import Interrupted, RunFailed, Stopped
 from ..io import checkpoint
 from ..io.datasets import Meaning
@@ -20,6 +18,7 @@ from ..io.writer import GridPlace, Recorder, record_end
 from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
 from ..simulation.schedule import SAME, Due, due_times
+from ..threads import one_thread_of_blas
 from .progress import Progress, Signals
 from .result import Result
 
@@ -210,9 +209,7 @@ class Loop:
     def _guarded(self, work: Callable[[], tuple[str, str]]) -> Result:
         """Do the work, and leave the files as they should be however it ends."""
         try:
-            # Small dense solves on all cores of a busy machine are some forty times slower than on one: threads are
-            # for the transforms.
-            with self._signals, threadpool_limits(limits=1, user_api="blas"):
+            with self._signals, one_thread_of_blas():
                 try:
                     status, reason = work()
                 except (Interrupted, BrokenPipeError):  # the pipe it speaks into: `ibfil run CASE | head`

@@ -88,7 +88,4 @@ def assemble(case: Case, laws: Mapping[str, MomentLaw] = MappingProxyType({}), w
         fft.learn(wisdom)
     fluid, method = surrounding(described, rods), described.method(rods)
     noise = scheme.noise(case, rods)
-    model = Model(case, rods, described, *fluid, method, noise, scheme.stepper(case, noise))
-    if model.transforms:
-        fft.remember()
-    return model
+    return Model(case, rods, described, *fluid, method, noise, scheme.stepper(case, noise))

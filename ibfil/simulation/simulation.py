@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -33,7 +35,8 @@ class Simulation:
     """One run of a case, at the present ``time`` after ``steps`` steps; ``model`` is what the case was assembled to.
 
     ``laws`` are constitutive laws made in Python, by filament, which go before the case's (rods/constitutive.py).
-    Raises CaseError where the scene cannot be built.
+    One thread at a time: another one that asks meanwhile is refused with a RuntimeError. Raises CaseError where the
+    scene cannot be built.
     """
 
     def __init__(self, case: Case, wisdom: str = "", laws: Mapping[str, MomentLaw] = MappingProxyType({})) -> None:
@@ -43,6 +46,7 @@ class Simulation:
         self._diagnostics = Diagnostics(self.model)
         self.state_now = State(0.0, self.start, np.zeros((len(self.arclength), self.system.unknowns)), 0.0)
         self.steps = self._iterations = 0
+        self._turn = threading.RLock()
         self.notices: list[str] = []  # what has happened and nobody was told yet
         self._told = False  # that the fluid moves too far in a step
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -121,11 +125,22 @@ class Simulation:
         Raises RunFailed where the rods diverge, over-stretch, or the step cannot be solved; Stopped at a contact
         that ends the run.
         """
-        if self.steps == 0:
-            self._watch(self.state_now)
-        while self.time < until:
-            self.accept(*self._solve(until))
-            after_step()
+        with self._alone():
+            if self.steps == 0:
+                self._watch(self.state_now)
+            while self.time < until:
+                self.accept(*self._solve(until))
+                after_step()
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Within it this thread alone uses the simulation. Raises RuntimeError where another one does."""
+        if not self._turn.acquire(blocking=False):
+            raise RuntimeError("this Simulation is in use by another thread; make one for each thread")
+        try:
+            yield
+        finally:
+            self._turn.release()
 
     def _solve(self, until: float) -> tuple[Step, float]:
         """The next step, made as often as it takes, and the time it leads to."""
@@ -283,14 +298,16 @@ class Simulation:
 
     def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
-        now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened)
-        return self._diagnostics.snapshot(now, fields)
+        with self._alone():
+            now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened)
+            return self._diagnostics.snapshot(now, fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
 
     def state(self) -> dict[str, np.ndarray | float | int | str]:
         """All that is needed to go on bit for bit, also between two outputs."""
-        velocity, force, reaction = self._motion()
+        with self._alone():
+            velocity, force, reaction = self._motion()
         return {
             "time": self.time,
             "steps": self.steps,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+import time as clock
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -29,11 +31,15 @@ if TYPE_CHECKING:
 PICTURES, FILMS = (".png",), (".mp4", ".gif")
 FLOWS = ("none", "slice", "glyphs", "streamlines")
 SMALLEST, LARGEST = 160, 7680
+_TELL_EVERY = 5.0  # seconds between two lines of a film's progress
 PACKAGES = "libegl1 and libgl1-mesa-dri"
 _PROBE = (
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=[64, 64]); p.add_mesh(pyvista.Sphere()); "
     "raise SystemExit(int(p.screenshot(return_img=True).std() == 0))"
 )
+
+
+_TURN = threading.Lock()  # vtk draws in one thread at a time
 
 
 class Wish(NamedTuple):
@@ -71,7 +77,7 @@ def render(
     if not can_render():
         line = f"pictures cannot be rendered here; install the Debian packages {PACKAGES}"
         raise CaseError([f"{path}: {line} (apt-get install libegl1 libgl1-mesa-dri)"])
-    with open_run(run) as opened:
+    with _TURN, open_run(run) as opened:
         if wish.flow != "none":
             opened.velocity_at(np.zeros((1, 3)))  # where there is no flow it says so
         pictures = _Pictures(opened, wish)
@@ -237,7 +243,9 @@ def _save_film(
     if path.suffix == ".mp4":
         more = {"fps": fps, "macro_block_size": 2, "quality": 8}
     with replacing(path) as part, imageio.get_writer(part, **more) as film:
+        told = clock.monotonic()
         for i, picture in enumerate(pictures, 1):
             film.append_data(picture)
-            if i % 50 == 0:
+            if i == 1 or i == count or clock.monotonic() - told > _TELL_EVERY:
+                told = clock.monotonic()
                 log(f"{path}: {i} of {count} pictures")

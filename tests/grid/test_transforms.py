@@ -9,8 +9,10 @@ import numpy as np
 import pyfftw
 import pytest
 
+from ibfil.case.reading import parse_case
 from ibfil.grid import fft
 from ibfil.grid.fft import VectorTransform
+from ibfil.running.run import run
 
 CELLS = (10, 9, 14)
 
@@ -88,12 +90,73 @@ def test_wisdom_of_a_run_file_comes_back():
 
 def test_plans_are_remembered_between_runs_in_the_users_cache():
     VectorTransform(CELLS)
-    fft.remember()
     file = fft.wisdom_file()
-    assert [p.name for p in file.parent.iterdir()] == [file.name]  # the partial file is gone
+    assert {p.name for p in file.parent.iterdir()} == {file.name, "fftw-wisdom.lock"}  # the partial file is gone
     pyfftw.forget_wisdom()
     fft.learn()
     assert known(CELLS)
+
+
+def test_a_plan_that_another_process_has_found_meanwhile_is_taken():
+    VectorTransform(CELLS)
+    pyfftw.forget_wisdom()
+    before = fft.wisdom_file().read_bytes()
+    VectorTransform(CELLS)
+    assert plans(fft.wisdom()) == plans(before.decode())
+    assert fft.wisdom_file().read_bytes() == before
+
+
+RUN = """
+[filament.rod]
+length = 1.0
+nodes = 25
+bending = 1.0
+twisting = 1.0
+radius = 0.05
+stretching = 400
+curvature = ["6*sin(6*s - 200*t)", "4*s"]
+shape = { kind = "relaxed" }
+[fluid]
+model = "stokes"
+method = "pruned"
+viscosity = 1.0
+density = 1.0
+box = [3, 3, 3]
+cells = [30, 30, 30]
+[time]
+end = 0.02
+step = 1e-3
+[output]
+every = 0.02
+"""
+
+
+def shape_after(*overrides: str) -> bytes:
+    """The bits that a run ends with."""
+    return (
+        run(parse_case(RUN, "rod.toml", overrides), progress=False, log=len)
+        .snapshot.filaments["rod"]
+        .position.tobytes()
+    )
+
+
+NAVIER_STOKES = ("fluid.model=navier-stokes", "fluid.method=auto")
+
+
+@pytest.mark.parametrize(
+    "overrides", [(), ("fluid.method=fft",), NAVIER_STOKES], ids=["pruned", "fft", "navier-stokes"]
+)
+@pytest.mark.parametrize("cache", ["kept", "none"])
+def test_equal_runs_have_equal_bits(tmp_path, overrides, cache):
+    """Also where the first has measured its plans, the second knows those of other runs, or none can be kept."""
+    if cache == "none":
+        (tmp_path / "cache").write_text("in the way")
+    first = shape_after(*overrides)
+    pyfftw.forget_wisdom()
+    second = shape_after(*overrides)
+    for cells in ((30, 30, 30), (12, 30, 30), (30, 16, 30)):
+        VectorTransform(cells)
+    assert shape_after(*overrides) == second == first
 
 
 def test_wisdom_given_is_taken_and_the_cache_is_not():
@@ -153,7 +216,6 @@ def test_a_damaged_cache_costs_planning_time_and_nothing_else(content):
 def test_a_cache_cut_short_is_no_fault(cut):
     text = whole()
     file = fft.wisdom_file()
-    file.parent.mkdir(parents=True)
     file.write_text(text[: int(cut * len(text))])
     fft.learn()
     words = [base64.b64decode(part) for part in json.loads(text)]
@@ -173,10 +235,9 @@ def test_a_cache_folder_that_cannot_be_made_is_no_fault(tmp_path, where):
 
 
 def test_a_cache_that_cannot_be_replaced_is_no_fault_and_leaves_nothing_behind():
-    VectorTransform(CELLS)
     file = fft.wisdom_file()
     file.mkdir(parents=True)  # a folder where the file should be
-    fft.remember()
+    VectorTransform(CELLS)
     assert file.is_dir()
     fft.learn()
-    assert [p.name for p in file.parent.iterdir()] == [file.name]
+    assert {p.name for p in file.parent.iterdir()} == {file.name, "fftw-wisdom.lock"}

@@ -52,5 +52,6 @@ class StokesModel(GridModel):
     def solve_for_flow(self) -> StokesSolve:
         """One whole FFT there and back, planned in a hurry."""
         from ...fluids.stokes import StokesSolve
+        from ...grid.fft import ESTIMATED
 
-        return StokesSolve(self.grid, self.case.fluid.viscosity, self.case.compute.threads, "FFTW_ESTIMATE")
+        return StokesSolve(self.grid, self.case.fluid.viscosity, self.case.compute.threads, ESTIMATED)
