@@ -18,11 +18,12 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
     case = simulation.case
     bending, length = timescales.softest(filament), filament.length
     out: dict[str, float] = {}
-    rate = max(simulation.driving_rates(), default=0.0)
+    rate = simulation.drivers.beat or max(simulation.drivers.fastest, simulation.load_rate)
     if rate:
         out["sperm number"] = length * (simulation.drag(filament) * rate / bending) ** 0.25
-    if simulation.forcing_rates and case.time.tolerance is None:  # with one, steps are not known beforehand
-        out["omega dt"] = max(simulation.forcing_rates) * simulation.step_length
+    if simulation.drivers.fastest and case.time.tolerance is None:  # with one, steps are not known beforehand
+        fastest = simulation.drivers.repeating if case.time.automatic else simulation.drivers.fastest
+        out["omega dt"] = fastest * simulation.step_length
     stretching = float(np.min(filament.stretching.bind("s", "t")(np.linspace(0, length, 11), 0.0)))
     out["EA L^2/A"] = stretching * length**2 / bending
     if case.thermal is not None and case.thermal.energy > 0:

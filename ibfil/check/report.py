@@ -13,6 +13,7 @@ from ..case.idle import idle_keys
 from ..observables.factory import observers
 from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
+from ..simulation.steps import AUTOMATIC_ERROR, POINTS_A_PERIOD
 from ..timestepping.step_control import equal_parts
 from .budget import disk, memory, shares, terms
 from .dimensionless import groups
@@ -143,7 +144,10 @@ def _costs(simulation: Simulation) -> list[str]:
         lines.append(f"seconds a step, from counts: {others}")
     steps, seconds = foretold_steps(simulation), methods[simulation.method]
     may = "" if fluid.steps_known or not case.time.automatic else "at least "  # see step_lines
-    total = f"{may}about {steps} steps, {steps * seconds:.2g} s after start-up"
+    fewest = case.time.end / max(simulation.choice.longest, simulation.step_length)
+    count = f"{steps}" if fewest > 0.99 * steps else f"{fewest:.0f} to {steps}"
+    most = "" if count == f"{steps}" else " at most"
+    total = f"{may}about {count} steps, {steps * seconds:.2g} s{most} after start-up"
     if case.time.tolerance is not None:
         total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
     lines.append(f"{total}, from counts (within a factor 3)")
@@ -157,22 +161,68 @@ def foretold_steps(simulation: Simulation) -> int:
 
 
 def _steps(simulation: Simulation) -> list[str]:
-    case = simulation.case
-    chosen = "automatic" if case.time.automatic else "given"
+    case, choice = simulation.case, simulation.choice
     scheme = case.time.scheme if case.thermal is None else "linearised trapezoid (semi-implicit)"
-    length = f"dt = {simulation.step_length:.4g} ({chosen})"
+    length = f"dt = {simulation.step_length:.4g} (given)"
     if case.time.tolerance is not None:
         length = f"dt = {simulation.step_length:.4g} at first, then what an error of {case.time.tolerance:g} allows"
-    lines = [
-        f"{scheme}, order {case.time.order}: {length}",
+    elif case.time.automatic:
+        length = f"dt = {simulation.step_length:.4g} (automatic: {choice.reason})"
+    lines = [f"{scheme}, order {case.time.order}: {length}"]
+    if case.time.automatic and case.time.tolerance is None:
+        lines += _automatic(simulation)
+    if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
+        lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
+    return [
+        *lines,
         f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
         *simulation.model.fluid_model.step_lines(),
+        *_driven(simulation),
+        f"slowest bending time: {simulation.bending_time():.4g}",
     ]
-    if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
-        lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
-    rates = simulation.driving_rates()
-    if rates and max(rates) > 0:
-        lines.append(f"shortest period of what drives the rods: {2 * np.pi / max(rates):.4g}")
-    lines.append(f"slowest bending time: {simulation.bending_time():.4g}")
+
+
+def _automatic(simulation: Simulation) -> list[str]:
+    """How an automatic step changes, and how to have its error decide."""
+    lines, choice = [], simulation.choice
+    if choice.growth:
+        lines.append(
+            f"  it grows, up to {choice.longest:.4g} ({choice.growth}), as far as an error of {AUTOMATIC_ERROR:g} of "
+            "the length over the run lets it"
+        )
+    growth = simulation.growth_rate()
+    if growth:
+        lines.append(
+            f"  at first no longer than {2 * np.pi / growth / POINTS_A_PERIOD:.3g}: disturbances of the rods grow or "
+            f"swing by {growth:.4g} radians a time (their leading mode)"
+        )
+    if not simulation.case.time.explicit and simulation.case.thermal is None:
+        lines.append(
+            "  time.tolerance would have the error of each step decide: 1e-3 of the length a unit time is a start"
+        )
+    return lines
+
+
+def _driven(simulation: Simulation) -> list[str]:
+    """The period of what drives, its fastest change, its jumps."""
+    drivers, load = simulation.drivers, simulation.load_rate
+    lines = []
+    if drivers.windows:
+        period = drivers.period
+        repeats = "never repeats itself"
+        if period is not None:
+            since = f" from t = {period.since:.4g} on" if period.since > 0 else ""
+            repeats = f"repeats itself after {period.length:.4g}{since}"
+        lines.append(
+            f"what is prescribed in time {repeats}; its fastest change is that of a period of "
+            f"{2 * np.pi / drivers.fastest:.4g}"
+            if drivers.fastest
+            else f"what is prescribed in time {repeats}"
+        )
+    if drivers.jumps:
+        times = ", ".join(f"{t:.4g}" for t in drivers.jumps[:4]) + (" ..." if len(drivers.jumps) > 4 else "")
+        lines.append(f"it jumps at t = {times}: steps end there")
+    if load:
+        lines.append(f"loads or flow move a rod by its length in {2 * np.pi / load:.4g}")
     return lines

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..shapes import initial
+from ..simulation import steps
 from .dimensionless import of_filament
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
 
-ACCURATE_OMEGA_DT = 0.3  # omega dt up to which the default scheme was measured to be accurate
 FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
 QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
 THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
@@ -30,12 +30,22 @@ def warnings(simulation: Simulation) -> list[str]:
         key, found = f"filament.{name}", of_filament(simulation, filament)
         out += fluid.warnings_of(simulation, name, found)
         out += _of_held_ends(key, filament)
-        if not case.time.explicit and found.get("omega dt", 0.0) > 1.01 * ACCURATE_OMEGA_DT:
-            found_dt = f"omega dt = {found['omega dt']:.3g}"
-            out.append(f"time.step: {found_dt}; the schemes are accurate up to about {ACCURATE_OMEGA_DT}")
         where = simulation.nodes(name)
         out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
-    return out + _of_run(simulation) + fluid.warnings(simulation)
+    return out + _of_given_step(simulation) + _of_run(simulation) + fluid.warnings(simulation)
+
+
+def _of_given_step(simulation: Simulation) -> list[str]:
+    """A given step too long for what is prescribed in time, or for how fast disturbances of the rods grow or swing."""
+    time = simulation.case.time
+    if time.automatic or time.explicit or time.tolerance is not None:
+        return []
+    dt = float(time.step)
+    rates = {
+        "what is prescribed in time": simulation.drivers.fastest,
+        steps.OWN: simulation.growth_rate(),
+    }
+    return [steps.too_long(dt, what, rate) for what, rate in rates.items() if steps.is_long(dt, rate)]
 
 
 def _of_held_ends(key: str, filament: Filament) -> list[str]:

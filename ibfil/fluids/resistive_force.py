@@ -55,21 +55,29 @@ def mobilize(drag: Drag, e3, force):
 
 
 @njit(cache=True)
-def _system(stiffness, drag: Drag, e3, moved, force, inverse):
-    """Turns K into K - Z/tau in place, and returns the right side Z moved/tau - f (n, m)."""
-    n, m, width = stiffness.shape
+def _add_drag(matrix, drag: Drag, e3, factor):
+    """Adds ``factor`` Z to a band matrix, in place."""
+    n, m, width = matrix.shape
     here = (width - m) // 2
-    right = resist(drag, e3, moved)
     for i in range(n):
-        t, along = at(e3, i, 0), (drag.par[i] - drag.perp[i]) * inverse
-        for a in range(m):
-            right[i, a] = inverse * right[i, a] - force[i, a]
+        t, along = at(e3, i, 0), (drag.par[i] - drag.perp[i]) * factor
         for a in range(3):
             for b in range(3):
-                stiffness[i, a, here + b] -= along * t[a] * t[b]
-            stiffness[i, a, here + a] -= drag.perp[i] * inverse
+                matrix[i, a, here + b] += along * t[a] * t[b]
+            matrix[i, a, here + a] += drag.perp[i] * factor
         if m == 4:
-            stiffness[i, 3, here + 3] -= drag.spin[i] * inverse
+            matrix[i, 3, here + 3] += drag.spin[i] * factor
+
+
+@njit(cache=True)
+def _system(stiffness, drag: Drag, e3, moved, force, inverse):
+    """Turns K into K - Z/tau in place, and returns the right side Z moved/tau - f (n, m)."""
+    n, m = force.shape
+    right = resist(drag, e3, moved)
+    for i in range(n):
+        for a in range(m):
+            right[i, a] = inverse * right[i, a] - force[i, a]
+    _add_drag(stiffness, drag, e3, -inverse)
     return right
 
 
@@ -150,6 +158,22 @@ def _rows_times(rows: np.ndarray, nodes: np.ndarray, d: np.ndarray) -> np.ndarra
     return np.stack([row @ padded[i : i + 2 * w + 1].ravel() for row, i in zip(rows, nodes, strict=True)])
 
 
+class LinearStep(NamedTuple):
+    """y -> (1 - tau M K)^-1 y for displacements y (n, m) of nodes at frozen positions."""
+
+    system: banded.Factored
+    drag: Drag
+    e3: np.ndarray
+    held: np.ndarray
+    tau: float
+
+    def __call__(self, y: np.ndarray, /) -> np.ndarray:
+        """The displacements (n, m) a step later."""
+        right = resist(self.drag, self.e3, y / self.tau).ravel()
+        right[self.held] = 0.0
+        return self.system.solve(right).reshape(y.shape)
+
+
 class ResistiveForce(Memoryless):
     """The RFT fluid.
 
@@ -177,6 +201,19 @@ class ResistiveForce(Memoryless):
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Response:
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
         return _Response(self.drag, self.profile, e3, self.advected(r, e3, time), tau)
+
+    def linear_step(self, e3: np.ndarray, stiffness: np.ndarray, held: np.ndarray, tau: float) -> LinearStep:
+        """The step y -> (1 - tau M K)^-1 y of displacements (n, m), zero at the unknowns ``held`` (k,); factored.
+
+        Raises numpy.linalg.LinAlgError where it is singular.
+        """
+        system, m = -stiffness, stiffness.shape[1]
+        _add_drag(system, self.drag, e3, 1.0 / tau)
+        here = (stiffness.shape[2] - m) // 2
+        for node, part in zip(held // m, held % m, strict=True):
+            system[node, part] = 0.0
+            system[node, part, here + part] = 1.0
+        return LinearStep(banded.Factored(system), self.drag, e3, held, tau)
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from scipy.linalg import solve_banded
+from scipy.linalg.lapack import dgbtrf, dgbtrs
 
 from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
 from .vectors import NOT_NEGATIVE
@@ -135,16 +136,30 @@ def lapack_form(matrix: np.ndarray) -> tuple[int, np.ndarray]:
     """The same matrix by diagonals: the number of upper (and lower) ones in use, and the array solve_banded takes."""
     n, m, width = matrix.shape
     w = (width // m - 1) // 2
-    rows, upper = n * m, (w + 1) * m - 1
-    diagonals = np.zeros((2 * upper + 1, rows))
-    flat = matrix.reshape(rows, width)
-    for r in range(rows):
-        base = (r // m - w) * m
-        columns = np.arange(max(0, base), min(rows, base + width))
-        diagonals[upper + r - columns, columns] = flat[r, columns - base]
+    count, upper = n * m, (w + 1) * m - 1
+    rows = np.arange(count)[:, None]
+    columns = (rows // m - w) * m + np.arange(width)
+    inside = (columns >= 0) & (columns < count)
+    diagonals = np.zeros((2 * upper + 1, count))
+    diagonals[(upper + rows - columns)[inside], columns[inside]] = matrix.reshape(count, width)[inside]
     used = np.nonzero(diagonals.any(axis=1))[0]
     spare = int(min(used[0], 2 * upper - used[-1]))
     return upper - spare, diagonals[spare : 2 * upper + 1 - spare]
+
+
+class Factored:
+    """LU factors, with pivots, of a band matrix. Raises numpy.linalg.LinAlgError where it is singular."""
+
+    def __init__(self, matrix: np.ndarray) -> None:
+        self._upper, diagonals = lapack_form(matrix)
+        room = np.zeros((self._upper, diagonals.shape[1]))
+        self._lu, self._pivots, fault = dgbtrf(np.vstack([room, diagonals]), self._upper, self._upper)
+        if fault:
+            raise np.linalg.LinAlgError("Singular matrix")
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """x (n m,) of the matrix times x = ``right`` (n m,)."""
+        return np.asarray(dgbtrs(self._lu, self._upper, self._upper, right, self._pivots)[0])
 
 
 @njit(cache=True)

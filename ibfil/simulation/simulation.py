@@ -17,8 +17,9 @@ from ..rods.geometry import Configuration
 from ..timestepping.base import FAILURES, State, Step
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import Verdict
-from . import failures, timescales
+from . import failures, steps, timescales
 from .diagnostics import Diagnostics, SolvedState
+from .driving.drivers import Drivers
 from .model import assemble
 
 if TYPE_CHECKING:
@@ -48,9 +49,12 @@ class Simulation:
         self.steps = self._iterations = 0
         self._turn = threading.RLock()
         self.notices: list[str] = []  # what has happened and nobody was told yet
-        self._told = False  # that the fluid moves too far in a step
+        self._told = self._grown = False  # that the fluid moves too far in a step; that a disturbance grows too fast
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self._control = timescales.control(self.model)
+        self.drivers = Drivers(self.model)
+        self.choice = steps.choose(self.model, self.drivers)
+        self._control = self.choice.control
+        self.limits = steps.StepLimits(self.model, self.drivers)
 
     # -- what it is made of --------------------------------------------------------------------------------------
 
@@ -129,7 +133,7 @@ class Simulation:
             if self.steps == 0:
                 self._watch(self.state_now)
             while self.time < until:
-                self.accept(*self._solve(until))
+                self.accept(*self._solve(self.limits.breaks.goal(self.time, until)))
                 after_step()
 
     @contextmanager
@@ -161,7 +165,10 @@ class Simulation:
 
     def attempt(self, dt: float) -> Step:
         """A step of length dt from the present state, not yet taken."""
-        step = self.model.stepper.step(self.system, self.fluid, self.state_now, dt)
+        breaks, now = self.limits.breaks, self.time
+        before, after = breaks.before(now), breaks.before(now + dt)
+        dt += (after - (now + dt)) + (now - before)
+        step = self.model.stepper.step(self.system, self.fluid, self.state_now._replace(time=before), dt)
         self.rods.contact.refuse_passing(self.configuration.r, step.state.configuration.r)
         return step
 
@@ -183,9 +190,9 @@ class Simulation:
     def longest_step(self) -> float:
         """The longest step that the fluid's own motion allows; infinite where the step is given."""
         time, longest = self.case.time, self.fluid.longest_step()
-        if time.tolerance is not None or longest == np.inf:
-            return longest
-        return self.model.fluid_model.automatic_limit(longest) if time.automatic else np.inf
+        if time.tolerance is None and longest < np.inf:
+            longest = self.model.fluid_model.automatic_limit(longest) if time.automatic else np.inf
+        return min(longest, self.limits.longest(self.state_now, self.steps, self._control.reach))
 
     @property
     def shortened(self) -> int:
@@ -200,8 +207,12 @@ class Simulation:
     def accept(self, step: Step, time: float) -> None:
         """Take a step, which led to ``time``. Raises RunFailed where it led out of bounds, Stopped at a contact."""
         before, self.state_now = self.state_now, step.state._replace(time=time)
+        if self.limits.breaks.at(time):
+            self.state_now = self.state_now._replace(dt_old=0.0)
+            self._control.restart()
         self.fluid.advance(step.response, step.velocity, step.force)
         self._look_at_crossing(time - before.time)
+        self._look_at_growth(time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
         self.steps += 1
         if self.steps > self.case.time.max_steps:
@@ -232,6 +243,13 @@ class Simulation:
                 f"is extrapolated, stable up to about one: take a step below {longest:.3g}"
             )
 
+    def _look_at_growth(self, dt: float) -> None:
+        """Tells, once, of a given step too long for disturbances that have begun to grow since the start."""
+        rate = self.limits.begun
+        if rate and not self._grown and steps.is_long(dt, rate):
+            self._grown = True
+            self.notices.append(f"at t = {self.time:.4g}: {steps.too_long(dt, steps.OWN, rate)}")
+
     def _watch(self, before: State) -> None:
         """Looks for a contact since ``before``, where the case has [contact]."""
         now = self.state_now
@@ -247,18 +265,14 @@ class Simulation:
 
     # -- its speeds ----------------------------------------------------------------------------------------------
 
-    def driving_rates(self) -> list[float]:
-        """How fast the scene is driven, radians per time: by what changes in time, and by what pushes."""
-        return self.forcing_rates + self._load_rates
-
     @cached_property
-    def forcing_rates(self) -> list[float]:
-        """How fast it is driven by what changes in time."""
-        return timescales.forcing_rates(self.model)
+    def load_rate(self) -> float:
+        """How fast what pushes moves rods by their length, radians a time; 0 where nothing does."""
+        return timescales.load_rate(self.model, self.drivers)
 
-    @cached_property
-    def _load_rates(self) -> list[float]:
-        return timescales.load_rates(self.model)
+    def growth_rate(self) -> float:
+        """How fast the fastest disturbance grows at present, radians a time; 0 where none does."""
+        return self.limits.growth_rate(self.state_now, self.steps, self.step_length)
 
     def drag(self, filament) -> float:
         """A drag per length across, for time scales: the case's own in RFT, 4 pi eta on a grid."""
@@ -321,6 +335,7 @@ class Simulation:
             "force": force,
             "reaction": reaction,
             **{f"control_{key}": value for key, value in self._control.state().items()},
+            **{f"limits_{key}": value for key, value in self.limits.state().items()},
             **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
             **({} if self.model.noise is None else {"random": self.model.noise.state()}),
             **self.rods.contact.state(),
@@ -345,6 +360,7 @@ class Simulation:
         self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
         control = {k.removeprefix("control_"): v for k, v in (array | number).items() if k.startswith("control_")}
         self._control.restore(control)
+        self.limits.restore({k.removeprefix("limits_"): v for k, v in number.items() if k.startswith("limits_")})
         memory = {k.removeprefix("fluid_"): v for k, v in (array | number).items() if k.startswith("fluid_")}
         if memory:
             self.fluid.recall(memory)

@@ -43,6 +43,10 @@ class StepControl(Protocol):
     def length(self) -> float:
         """The longest step, or the present one where an error decides."""
 
+    @property
+    def reach(self) -> float:
+        """The longest step that may be proposed next."""
+
     def propose(self, state: State, until: float, limit: float) -> Proposal:
         """The next step from ``state``, none beyond ``until``; ``limit``: what the fluid's own motion allows."""
 
@@ -51,6 +55,9 @@ class StepControl(Protocol):
 
     def shorten(self, dt: float) -> Verdict:
         """The verdict on a step of length dt that could not be solved: the next proposal is half of it."""
+
+    def restart(self) -> None:
+        """Begins anew: the next step looks back at none."""
 
     def state(self) -> dict[str, Any]:
         """The state of the control, by name: part of a run's state."""
@@ -77,11 +84,17 @@ class FixedStep:
         self._plan = (0.0, 0.0, 1, 1)  # interval start and end, its number of steps, those taken
         self._trial = 0.0  # length to try for the step of the plan that is under way; 0 where none is
 
+    @property
+    def reach(self) -> float:
+        """As long as any."""
+        return self.length
+
     def propose(self, state: State, until: float, limit: float) -> Proposal:
         """The next step of the plan, or a part of it where it had to be halved or may not grow so fast."""
         start, end, count, done = self._plan
-        between = self._trial == 0.0 and done > 0
-        if end != until or done >= count or (between and (end - start) / count > limit):
+        between, planned = self._trial == 0.0 and done > 0, (end - start) / count
+        stale = planned > limit or (planned < 0.5 * self.length and limit > 2.0 * planned)
+        if end != until or done >= count or (between and stale):
             self._plan, self._trial = (state.time, until, self._parts(state, until, limit), 0), 0.0
         goal = self._goal()
         rest, old = goal - state.time, state.dt_old
@@ -112,6 +125,9 @@ class FixedStep:
         else:
             self._trial = 2.0 * dt
         return Verdict.ACCEPTED
+
+    def restart(self) -> None:
+        """Equal steps know no past."""
 
     def shorten(self, dt: float) -> Verdict:
         """Half of it."""
@@ -164,14 +180,25 @@ class AdaptiveStep:
     2.41). Three rejections in a row, as at a jump in what drives the rods, start again from an Euler step.
     """
 
-    def __init__(self, tolerance: float, rate: float, longest: float, order: int, size: float) -> None:
-        """``rate``: how fast the scene changes (radians a time); ``size``: the length errors are relative to."""
-        self.tolerance, self.length, self._longest = tolerance, min(tolerance, 1.0) / rate, longest
+    def __init__(
+        self, tolerance: float, rate: float, longest: float, order: int, size: float, shortest: float = 0.0
+    ) -> None:
+        """``rate``: how fast the scene changes (radians a time); ``size``: the length errors are relative to.
+
+        ``shortest``: a step that is good enough whatever its error; the first one, and after what drives jumps.
+        """
+        self.tolerance, self._longest, self._shortest = tolerance, longest, shortest
+        self.length = shortest or min(tolerance, 1.0) / rate
         self._rate, self._order, self._size = rate, order, size
         self.shortened = 0
         self._rejected = 0  # times in a row
         self._wanted = 0.0  # what the error of the last step would allow the next; 0 where that has been seen to
         self._before: list[tuple[float, np.ndarray]] = []  # dt and displacements of the step before the last, if any
+
+    @property
+    def reach(self) -> float:
+        """The present one, or what the last error would allow."""
+        return max(self.length, self._wanted)
 
     def propose(self, state: State, until: float, limit: float) -> Proposal:
         """An equal part of the rest."""
@@ -188,9 +215,9 @@ class AdaptiveStep:
         """Accepts a step whose error is within the tolerance, and chooses the length of the next."""
         error = self._error(state, step, dt) / (self._size * max(dt, 0.01 / self._rate))
         scale = SAFETY * (self.tolerance / max(error, 1e-300)) ** (1.0 / self._power(state))
-        if not error <= self.tolerance:
+        if not error <= self.tolerance and dt > self._shortest * (1 + 1e-9):
             if np.isfinite(error):
-                self.length = dt * max(0.2, scale)
+                self.length = max(dt * max(0.2, scale), self._shortest)
             return self._reject()
         self._before = [(state.dt_old, state.y_old)] if state.dt_old > 0 else []
         self._rejected = 0
@@ -201,6 +228,10 @@ class AdaptiveStep:
         """Half of it."""
         self.length = 0.5 * dt
         return self._reject()
+
+    def restart(self) -> None:
+        """Looks back at no step; one that is good enough is next."""
+        self._before, self.length = [], self._shortest or self.length
 
     def _reject(self) -> Verdict:
         self._rejected += 1

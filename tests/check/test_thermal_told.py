@@ -13,7 +13,7 @@ from ibfil.check import report
 from ibfil.check.dimensionless import groups
 from ibfil.check.warnings import warnings
 from ibfil.errors import CaseError, RunFailed
-from ibfil.simulation import timescales
+from ibfil.simulation import steps, timescales
 from ibfil.simulation.simulation import Simulation
 
 
@@ -74,8 +74,8 @@ def matching(lines: list[str], pattern: str) -> list[str]:
 
 def test_the_automatic_step_keeps_kicks_from_stretching_the_rod():
     cold, hot = (Simulation(scene({"rod": ROD}, energy, time={"step": "auto"})) for energy in (1e-6, 0.1))
-    assert cold.step_length == pytest.approx(cold.bending_time() / timescales.POINTS_A_PERIOD)
-    assert 0.8 * timescales.STRETCH < hot.thermal_stretch(hot.step_length) <= timescales.STRETCH
+    assert cold.step_length == pytest.approx(cold.bending_time() / steps.POINTS_A_PERIOD)
+    assert 0.8 * steps.STRETCH < hot.thermal_stretch(hot.step_length) <= steps.STRETCH
     # The stiffest motion of a rod, of rate 2/limit, is forgotten no later than its slowest bending.
     stiff = Simulation(scene({"rod": {**ROD, "stretching": 1e6}}, 1e-6, time={"step": "auto"}))
     assert stiff.step_length**2 / (2 * stiff.explicit_limit()) == pytest.approx(stiff.bending_time())

@@ -157,7 +157,7 @@ def test_the_window_leaves_the_transient_out_and_counts_whole_periods():
     with pytest.raises(CaseError, match=r"time\.end"):
         choose_window(case, 1.5 * period, None, None)
     still = parse_case(SWIMMER.replace(" - 10*t", ""), "s")
-    assert choose_window(still, 8.0, None, None) == Window(8.0, 1.0, 4)
+    assert choose_window(still, 8.0, None, None) == Window(8.0, 1.0, 4, "nothing drives in time")
 
 
 def test_a_fluid_that_fails_is_told_and_the_others_are_compared(tmp_path, monkeypatch, environment, capsys):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ...case.schema import Case
     from ...fluids.base import Flow, Fluid
     from ...fluids.output import FluidOutput
+    from ...fluids.resistive_force import Drag
     from ...fluids.stokes import StokesSolve
     from ...grid.periodic_grid import Grid
     from ...io.snapshots import Snapshot
@@ -112,6 +113,10 @@ class FluidModel(ABC):
     def turning_drag(self, rods: RodStack, where: slice) -> float | None:
         """Torque per rate of turning a straight filament, nodes ``where``, about its middle; None: not known."""
         return None
+
+    @abstractmethod
+    def local_drag(self, rods: RodStack) -> Drag:
+        """The drag of every node by itself: all there is in resistive-force theory; elsewhere for time scales."""
 
     def automatic_limit(self, longest: float) -> float:
         """The longest automatic step, given the ``longest`` that the fluid's own motion allows."""

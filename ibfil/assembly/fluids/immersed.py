@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ...case.filament import Filament
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
+    from ...fluids.resistive_force import Drag
     from ...fluids.spaces.base import Space
     from ...grid.kernels import Kernel
     from ..stacked import RodStack
@@ -157,6 +158,14 @@ class ImmersedModel(FluidModel):
     def drag(self, filament: Filament) -> float:
         """4 pi eta, whatever the grid."""
         return 4 * np.pi * self.case.fluid.viscosity
+
+    def local_drag(self, rods: RodStack) -> Drag:
+        """4 pi eta across and 2 pi eta along, whatever the space; against spin the rods' own."""
+        from ...fluids.resistive_force import Drag
+
+        eta, volume = self.case.fluid.viscosity, rods.system.mesh.volume
+        spin = drag(self.case, rods).spin if rods.system.unknowns == 4 else volume
+        return Drag(4 * np.pi * eta * volume, 2 * np.pi * eta * volume, spin)
 
     def turning_drag(self, rods: RodStack, where: slice) -> float | None:
         """By the exact Stokes mobility of its nodes, alone, where it stands: the mean of the two ways to turn."""

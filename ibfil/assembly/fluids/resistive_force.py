@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ...case.filament import Filament
     from ...fluids.base import Fluid
     from ...fluids.output import FluidOutput
+    from ...fluids.resistive_force import Drag
     from ..stacked import RodStack
     from .base import Scene
 
@@ -55,6 +56,10 @@ class ResistiveForceModel(FluidModel):
         """The sum of zeta_perp Lc s^2, s from the middle of the drag."""
         perp, s = drag(self.case, rods).perp[where], rods.s[where]
         return float(np.sum(perp * (s - np.average(s, weights=perp)) ** 2))
+
+    def local_drag(self, rods: RodStack) -> Drag:
+        """The case's own."""
+        return drag(self.case, rods)
 
     def modelled(self) -> list[str]:
         """Drag, and where its coefficients come from."""

@@ -60,7 +60,8 @@ def _print_comparison(result: Any) -> None:
     tell("\n".join(table(lines)))
     window = result.window
     tell(
-        f"means over {window.count} x {window.period:.4g}, from t = {window.start:.4g} to {window.end:.4g}; "
+        f"means over {window.count} {'parts' if window.why else 'periods'} of {window.period:.4g}"
+        f"{f' (no periods: {window.why})' if window.why else ''}, from t = {window.start:.4g} to {window.end:.4g}; "
         "+- their standard error, from the scatter between these, not that of steps, nodes or cells"
     )
     for column in result.columns:

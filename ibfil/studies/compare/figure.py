@@ -142,5 +142,7 @@ def _numbers(axes: Axes, result: Comparison, looks: Looks) -> None:
     axes.axvline(1.0, color="0.8", lw=0.8, zorder=0)
     axes.set_yticks(range(len(names)), [textwrap.fill(name, 20) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
-    count = result.window.count if result.window else 0
-    axes.set_xlabel(f"over that of {columns[0].fluid}\n(mean of {count} periods; bars: standard error)")
+    count, what = (
+        (result.window.count, "parts" if result.window.why else "periods") if result.window else (0, "periods")
+    )
+    axes.set_xlabel(f"over that of {columns[0].fluid}\n(mean of {count} {what}; bars: standard error)")

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Window:
-    """``count`` whole periods, the last of which ends at ``end``."""
+    """``count`` whole periods, the last of which ends at ``end``; or equal parts, and ``why`` they are no periods."""
 
     end: float
     period: float
     count: int
+    why: str = ""
 
     @property
     def start(self) -> float:

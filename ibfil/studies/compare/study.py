@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 
 
 TABLE, DETAILS, FIGURE = "compare.csv", "compare.json", "compare.png"
-BLOCKS = 4  # parts of the second half of a run that nothing drives in time
-_SLACK = 1e-3  # of a period: what it may be wrong by, found by sampling what drives
+BLOCKS = 4  # parts of the second half of a run without a period
+_SLACK = 1e-6  # of a period: rounding
 _TRANSIENT = 1 / 3  # of a run, at least, and a whole period
 
 Log = Callable[[str], object]
 
 
-def _members(case: str, overrides: Sequence[str], fluids: Sequence[str]) -> list[Member]:
-    """A member a fluid, each with its dissipation looked at."""
+def _members(case: str, overrides: Sequence[str], fluids: Sequence[str]) -> tuple[Case, list[Member]]:
+    """The case as it is, and a member a fluid, each with its dissipation looked at."""
     known = known_fluids()
     faults = [f"--fluids: found {name}; allowed: {', '.join(known)}" for name in fluids if name not in known]
     if len(set(fluids)) < max(len(fluids), 2):
@@ -53,7 +53,7 @@ def _members(case: str, overrides: Sequence[str], fluids: Sequence[str]) -> list
     if not base.dissipation_observed:
         first = next(iter(base.filaments))
         seen = ("observe.dissipation.kind=dissipation", f"observe.dissipation.filament={first}")
-    return [Member(name, whole, (*overrides, *seen, *fluid_overrides(name, base))) for name in fluids]
+    return base, [Member(name, whole, (*overrides, *seen, *fluid_overrides(name, base))) for name in fluids]
 
 
 def compare(
@@ -70,12 +70,14 @@ def compare(
 ) -> Comparison:
     """Run the scene under each fluid and write compare.csv, compare.json and compare.png into ``folder``.
 
-    ``period`` is by default the slowest of what drives the scene; where nothing does, the second half of the run is
-    cut into four. ``transient`` is what is left out at the start, by default a third of the run and at least a period.
-    Raises CaseError, RunFailed where no run came to an end, Interrupted.
+    ``period`` is by default that of all that drives the scene; where it has none, the second half of the run is cut
+    into four parts, whose scatter is the uncertainty. ``transient`` is what is left out at the start, by default a
+    third of the run, at least a period, and until a soft start is over. Raises CaseError, before anything runs where
+    no period would be left, RunFailed where no run came to an end, Interrupted.
     """
-    folder, members = Path(folder), _members(case, overrides, fluids)
+    folder, (base, members) = Path(folder), _members(case, overrides, fluids)
     refuse_strangers(folder, DETAILS, TABLE, FIGURE)
+    choose_window(base, base.time.end, period, transient)
     outcomes = run_members(members, folder, jobs=jobs, executor=executor, log=log)
     if not any(outcome.done for outcome in outcomes):
         raise RunFailed("no fluid's run came to an end: " + "; ".join(outcome.message for outcome in outcomes))
@@ -119,30 +121,39 @@ def _observed(run: RunFile) -> dict[str, float]:
 
 
 def choose_window(case: Case, end: float, period: float | None, transient: float | None) -> Window:
-    """The whole periods that count. Raises CaseError where not one is left."""
+    """The whole periods that count of a run up to ``end``, or the parts of it where there are no periods.
+
+    Raises CaseError where not one period is left.
+    """
+    since, why = 0.0, ""
     if period is None:
-        period = driven_period(case)
+        period, since, why = _driven_period(case)
     if period is None:
         begin = transient if transient is not None else 0.5 * end
-        return Window(end, (end - begin) / BLOCKS, BLOCKS)
-    begin = transient if transient is not None else max(period, _TRANSIENT * end)
+        if not begin < end:
+            raise CaseError([f"--transient: found {begin:g}; allowed: below time.end = {end:g}"])
+        return Window(end, (end - begin) / BLOCKS, BLOCKS, why)
+    begin = transient if transient is not None else max(period, since, _TRANSIENT * end)
     count = int(np.floor((end - begin) / period + _SLACK))
     if count < 1:
+        least = begin + period if transient is not None else max(since, period) + period
         raise CaseError(
             [
-                f"time.end: found {end:g}; allowed: at least {begin + period:g}, "
-                f"a whole period ({period:g}) after the transient ({begin:g})"
+                f"time.end: found {end:g}; allowed: at least {least:.6g}: a whole period ({period:.6g}) after the "
+                f"transient, or --period and --transient of your own"
             ]
         )
     return Window(end, period, count)
 
 
-def driven_period(case: Case) -> float | None:
-    """The slowest period of what drives the scene; None where nothing changes in time."""
+def _driven_period(case: Case) -> tuple[float | None, float, str]:
+    """The period of what drives the scene and when it begins; None, and why, where there is none."""
     from ...simulation.simulation import Simulation
 
-    forcing_rates = Simulation(case).forcing_rates
-    return 2 * np.pi / min(forcing_rates) if forcing_rates else None
+    drivers = Simulation(case).drivers
+    if drivers.period is not None:
+        return *drivers.period, ""
+    return None, 0.0, "what drives never repeats itself" if drivers.windows else "nothing drives in time"
 
 
 def only_here(cases: Mapping[str, Case]) -> dict[str, tuple[str, ...]]:

@@ -12,7 +12,7 @@ on a grid with a slip of at least 0.01, which keeps rods from locking. The first
     stable      none of these
 
 Predictions, made without a run: that an explicit step beyond 2/rho(M K) diverges, that nodes nearer than 0.8 h without
-slip lock, and that omega dt beyond 0.3 is not accurate.
+slip lock, and that omega dt beyond 2 pi/20 is not accurate.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def _predicted(simulation: Any) -> str:
     """The name of what the dimensionless groups say will happen."""
     from ...assembly.fluids.grid_warnings import LOCKING_SPACING
     from ...check.dimensionless import groups
-    from ...check.warnings import ACCURATE_OMEGA_DT
+    from ...simulation.steps import LONG_PHASE
 
     case = simulation.case
     if case.time.explicit:
@@ -130,7 +130,7 @@ def _predicted(simulation: Any) -> str:
     if case.fluid.on_grid and case.fluid.slip == 0 and near < LOCKING_SPACING:
         return "locked"
     fast = max((value for key, value in found.items() if key.endswith("omega dt")), default=0.0)
-    return "wrong" if fast > 1.01 * ACCURATE_OMEGA_DT else ""
+    return "wrong" if fast > LONG_PHASE * (1 + 1e-9) else ""
 
 
 def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str) -> MapCell:
