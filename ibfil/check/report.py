@@ -142,11 +142,10 @@ def _costs(simulation: Simulation) -> list[str]:
     if len(methods) > 1:
         others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
         lines.append(f"seconds a step, from counts: {others}")
-    steps, seconds = foretold_steps(simulation), methods[simulation.method]
+    seconds = methods[simulation.method]
+    fewest, steps = foretold_steps(simulation)
     may = "" if fluid.steps_known or not case.time.automatic else "at least "  # see step_lines
-    fewest = case.time.end / max(simulation.choice.longest, simulation.step_length)
-    count = f"{steps}" if fewest > 0.99 * steps else f"{fewest:.0f} to {steps}"
-    most = "" if count == f"{steps}" else " at most"
+    count, most = (f"{steps}", "") if fewest == steps else (f"{fewest} to {steps}", " at most")
     total = f"{may}about {count} steps, {steps * seconds:.2g} s{most} after start-up"
     if case.time.tolerance is not None:
         total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
@@ -154,10 +153,13 @@ def _costs(simulation: Simulation) -> list[str]:
     return lines
 
 
-def foretold_steps(simulation: Simulation) -> int:
-    """How many steps of the present length a run takes: they end at each time at which something is due."""
+def foretold_steps(simulation: Simulation) -> tuple[int, int]:
+    """How many steps a run takes, at fewest and at most: they end at each time at which something is due."""
     times = [due.time for due in due_times(simulation.case, simulation.grid is not None)]
-    return sum(equal_parts(until - since, simulation.step_length) for since, until in pairwise(times))
+    shortest = simulation.step_length
+    lengths = (max(simulation.choice.longest, shortest), shortest)
+    fewest, most = (sum(equal_parts(until - since, length) for since, until in pairwise(times)) for length in lengths)
+    return fewest, most
 
 
 def _steps(simulation: Simulation) -> list[str]:

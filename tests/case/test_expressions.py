@@ -195,7 +195,7 @@ def test_a_call_parses_and_compiles_nothing(monkeypatch):
 
     s, t = np.linspace(0, 1, 128), 0.3
     bound = parse("8*sin(4*pi*s - 10*t)", VARIABLES).bind("s", "t")
-    for place, name in ((ast, "parse"), (evaluation, "_part"), (evaluation, "function_of"), (expressions, "parse")):
+    for place, name in ((ast, "parse"), (evaluation, "_source"), (evaluation, "function_of"), (expressions, "parse")):
         monkeypatch.setattr(place, name, never)
     assert bound(s, t) == pytest.approx(8 * np.sin(4 * np.pi * s - 10 * t), rel=1e-14, abs=1e-14)
 
