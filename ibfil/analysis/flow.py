@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ..assembly.fluids.models import fluid_model
-from ..assembly.grid import kernel
 from ..assembly.wrapped import recorded_thickness
 from ..errors import CaseError
 
@@ -29,7 +28,7 @@ def flow_of(run: RunFile) -> Flow:
     Raises CaseError for a run in resistive-force theory, and for one without the field that is needed.
     """
     fluid = fluid_model(run.case)
-    if fluid.grid is None:
+    if not run.case.fluid.on_grid:
         what = "resistive-force theory knows no flow between the rods"
         raise CaseError([f'{run.path}: fluid.model: found "rft"; {what}; allowed: a fluid on a grid'])
     if fluid.flow_from_forces:
@@ -44,38 +43,34 @@ def flow_of(run: RunFile) -> Flow:
 
 
 class FlowOfForces:
-    """u0 + J L^-1 S F: one solve on the run's own grid, whatever the number of points."""
+    """u0 + J L^-1 S F of the recorded forces, and of torques where the fluid tells their flow."""
 
     def __init__(self, run: RunFile, fluid: FluidModel) -> None:
         self._run, self._background, self._solve = run, fluid.flow, fluid.solve_for_flow()
-        self._kernel = kernel(run.case)
         rods = [(run.filament(name), run.arclength(name)) for name in run.filaments]
         self._thickness = recorded_thickness(fluid, rods)
 
     def velocity_at(self, points: np.ndarray, time: float) -> np.ndarray:
-        """One FFT there and back, and an interpolation with the run's kernel."""
-        from ..grid.spreading import interpolate
-
-        r, force = self._pushes(time)
-        field = self._solve.field(*self._stencil(r), force)
-        u = interpolate(*self._stencil(points), field)
+        """By the space that the fluid fills."""
+        u = self._solve.velocity_at(points, *self._pushes(time))
         return u if self._background is None else u + self._background(points, time)
 
-    def _stencil(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self._kernel.stencil(self._solve.grid.coordinates(r))
-
-    def _pushes(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions of all nodes, and what they push with (n, 3), linear between the outputs about ``time``."""
+    def _pushes(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions of all nodes, what they push with, and twist torques (n, 3), linear between outputs at ``time``."""
         i, part = between(self._run.time, time, str(self._run.path))
 
         def taken(key: str) -> np.ndarray:
-            two = np.concatenate([columns[key][i : i + 2] for columns in self._run.filaments.values()], axis=1)
+            parts = [
+                columns[key][i : i + 2] if key in columns else np.zeros_like(columns["force"][i : i + 2])
+                for columns in self._run.filaments.values()
+            ]
+            two = np.concatenate(parts, axis=1)
             return np.ascontiguousarray((1.0 - part) * two[0] + part * two[-1])
 
         r, force = taken("position"), taken("force")
-        if self._thickness is None:
-            return r, force
-        return r, force + self._thickness.at(r, time).from_fluid(taken("velocity"))
+        if self._thickness is not None:
+            force = force + self._thickness.at(r, time).from_fluid(taken("velocity"))
+        return r, force, taken("torque")
 
 
 class FlowOfField:

@@ -37,7 +37,7 @@ def digest(run: RunFile) -> dict[str, Any]:
         "units": case.units.model_dump(),
         "steps": run.steps,
         "wall_time": run.wall_time,
-        "fluid": case.fluid.model,
+        "fluid": case.fluid.words,
         "method": run.method,
         "groups": run.groups,
         "filaments": {name: columns["position"].shape[1] for name, columns in run.filaments.items()},

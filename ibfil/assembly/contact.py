@@ -35,8 +35,8 @@ def contact(
         parts.append((first, here[:-1], here[1:], np.full(len(first), number), radius))
     segments = Segments(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     box = np.zeros(3)
-    if case.fluid.on_grid:
-        box[:] = case.fluid.box
+    if case.fluid.on_grid and case.fluid.sides is not None:
+        box[:] = case.fluid.sides
         widest, longest = 2 * float(np.max(segments.radius)), float(np.max(segments.end - segments.begin))
         reach = (2 if given.action == "repel" else 1) * widest + longest
         if reach > 0.5 * np.min(box):

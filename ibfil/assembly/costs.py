@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 _NODE = 2.0e-6  # seconds a node for geometry, force, stiffness and a banded solve
-_SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
+SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
 _PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
 _COMPONENTS = 2.5  # the same of a table with torques, of one without
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
@@ -44,7 +44,7 @@ def pruned_evaluation(cells: Sequence[int], sizes: Sequence[int]) -> float:
 
 def evaluation(cells: Sequence[int], sizes: Sequence[int], nodes: int) -> float:
     """Seconds of one velocity evaluation of ``nodes`` by the cheaper transforms."""
-    return min(full_evaluation(cells), pruned_evaluation(cells, sizes)) + nodes * _SPREAD
+    return min(full_evaluation(cells), pruned_evaluation(cells, sizes)) + nodes * SPREAD
 
 
 def solved(nodes: int, parts: int = 3) -> float:
@@ -79,13 +79,18 @@ def seconds_a_step(
     """
     nodes = sum(rods)
     local = of_rods(case, nodes)
-    whole = (parts - 2) * (full_evaluation(cells) + nodes * _SPREAD)
+    whole = (parts - 2) * (full_evaluation(cells) + nodes * SPREAD)
     if case.fluid.inertial:
         return _by_method(case, rods, parts, local + of_inertia(cells, parts), {"fft": whole})
     if parts == 4:
         return _by_method(case, rods, parts, local, {"fft": whole})
-    pruned = pruned_evaluation(cells, sizes) + nodes * _SPREAD
+    pruned = pruned_evaluation(cells, sizes) + nodes * SPREAD
     return _by_method(case, rods, parts, local, {"fft": whole, "pruned": pruned})
+
+
+def of_methods(case: Case, rods: Sequence[int], parts: int, evaluations: dict[str, float]) -> dict[str, float]:
+    """The same of a fluid without a history, given the seconds of an evaluation by each kind of transforms."""
+    return _by_method(case, rods, parts, of_rods(case, sum(rods)), evaluations)
 
 
 def _table(nodes: int, parts: int) -> float:

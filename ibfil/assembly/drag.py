@@ -51,13 +51,11 @@ def matching(case: Case, filament: Filament) -> Match | None:
     nodes, radius = 1 + round(drag.matched * (filament.nodes - 1) / filament.length), 0.0
     if case.fluid.rotation == "grid" and filament.twisting is not None and filament.radius is not None:
         radius = float(np.mean(alone(filament.radius, np.linspace(0.0, filament.length, filament.nodes))))
-    rod = calibrated_drag.Rod(
-        drag.matched, nodes, grid.periodic_space(case), case.fluid.kernel, case.fluid.slip, radius
-    )
+    rod = calibrated_drag.Rod(drag.matched, nodes, grid.space(case), case.fluid.kernel, case.fluid.slip, radius)
     try:
         return calibrated_drag.match(rod)
     except ValueError as error:
-        allowed = "slip = 0.01, fewer nodes or more cells"
+        allowed = f"slip = 0.01, fewer nodes or {'a smaller spacing' if case.fluid.free else 'more cells'}"
         raise CaseError([f"{case.file}: fluid.drag: {error}; allowed: {allowed}"]) from None
 
 

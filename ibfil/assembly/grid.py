@@ -12,8 +12,10 @@ from .profiles import alone
 if TYPE_CHECKING:
     from ..case.schema import Case
     from ..fluids.coupling import Coupling
+    from ..fluids.spaces.free import FreeSpace
     from ..fluids.spaces.periodic import PeriodicSpace
     from ..grid.kernels import Kernel
+    from ..grid.periodic_grid import Lattice
     from .stacked import RodStack
 
 
@@ -28,7 +30,7 @@ def cells_of_thickness(case: Case) -> tuple[int, int, int]:
     """The cells that give ``thickness`` as the hydrodynamic line radius, or the nearest below. Raises CaseError."""
     from ..grid.periodic_grid import cells_for, smooth
 
-    box, thickness = case.fluid.box, case.fluid.thickness
+    box, thickness = case.fluid.sides, case.fluid.thickness
     assert box is not None
     assert thickness is not None
     largest = thickness / kernel(case).line_radius
@@ -55,14 +57,47 @@ def periodic_space(case: Case) -> PeriodicSpace:
     """The periodic box of the case. Raises CaseError where ``thickness`` has no cells."""
     from ..fluids.spaces.periodic import PeriodicSpace
 
-    assert case.fluid.box is not None
-    return PeriodicSpace(case.fluid.box, cells(case))
+    assert case.fluid.sides is not None
+    return PeriodicSpace(case.fluid.sides, cells(case))
+
+
+def free_space(case: Case) -> FreeSpace:
+    """Free space with the case's spacing, or the one that ``thickness`` asks for."""
+    from ..fluids.spaces.free import FreeSpace
+
+    return FreeSpace(spacing(case))
+
+
+def space(case: Case) -> PeriodicSpace | FreeSpace:
+    """The space that the case's fluid fills. Raises CaseError where ``thickness`` has no cells."""
+    return free_space(case) if case.fluid.free else periodic_space(case)
 
 
 def spacing(case: Case) -> float:
     """The grid's h. Raises CaseError where ``thickness`` has none."""
-    assert case.fluid.box is not None
-    return case.fluid.box[0] / cells(case)[0]
+    fluid = case.fluid
+    if fluid.sides is not None:
+        return fluid.sides[0] / cells(case)[0]
+    if fluid.spacing is not None:
+        return fluid.spacing
+    assert fluid.thickness is not None
+    return fluid.thickness / kernel(case).line_radius
+
+
+def window(case: Case) -> Lattice | None:
+    """The points of free space at which fields are written; None where the case has no window.
+
+    The window is rounded up to numbers of cells that FFTs like, and has a point at its middle.
+    """
+    from ..grid.periodic_grid import Lattice, smooth
+
+    if case.output.window is None:
+        return None
+    h = spacing(case)
+    least = [max(1, int(np.ceil(side / h * (1 - 1e-12)))) for side in case.output.window]
+    counts = np.array([next(n for n in range(k, 2 * k + 1) if smooth(n)) for k in least])
+    middle = np.rint(np.array(case.output.window_at or (0.0, 0.0, 0.0)) / h).astype(int)
+    return Lattice(counts.tolist(), h, (middle - counts // 2) * h)
 
 
 def twist_radius(case: Case) -> float:

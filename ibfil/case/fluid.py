@@ -52,8 +52,13 @@ def _drag(value: object) -> str:
     return "<word>"
 
 
+def _box(value: object) -> str:
+    """Which member of the union of boxes a value is meant to be."""
+    return "<word>" if isinstance(value, str) else "<sides>"
+
+
 class Fluid(Table):
-    """The fluid, and the grid it is solved on."""
+    """The fluid, the space it fills, and the grid it is solved on."""
 
     model: Literal["rft", "stokes", "navier-stokes"] = Field(description="which fluid", examples=["rft"])
     viscosity: Positive = Field(description="viscosity eta", examples=[1.0])
@@ -75,9 +80,18 @@ class Fluid(Table):
         description="whether flows turn rods by their thickness too (Jeffery orbits): by their radius, on a grid the "
         "kernel's where none is given; rft: or by an aspect ratio",
     )
-    box: Sizes | None = Field(None, description="periodic box, required by grid fluids")
-    cells: Cells | None = Field(None, description="cells along x, y, z, one h on all axes; or thickness")
-    thickness: Positive | None = Field(None, description="hydrodynamic line radius that chooses the cells")
+    box: (
+        Annotated[
+            Annotated[Literal["free"], tagged("word")] | Annotated[Sizes, tagged("sides")],
+            Discriminator(_box),
+        ]
+        | None
+    ) = Field(None, description="periodic box, or free: no box, for stokes; required by grid fluids")
+    cells: Cells | None = Field(None, description="cells along x, y, z of a box, one h on all axes; or thickness")
+    thickness: Positive | None = Field(
+        None, description="hydrodynamic line radius that chooses the cells, or the spacing of free space"
+    )
+    spacing: Positive | None = Field(None, description="h of the grid in free space; or thickness")
     kernel: Literal["roma3", "peskin4", "bspline4", "bspline6", "bkp6", "es4", "es5", "es6"] = Field(
         "peskin4", description="delta function"
     )
@@ -94,6 +108,26 @@ class Fluid(Table):
     def on_grid(self) -> bool:
         """Whether nodes move the fluid of a grid."""
         return self.model != "rft"
+
+    @property
+    def kind(self) -> str:
+        """The name of its model: the word, and of Stokes flow the space that it fills."""
+        return "free" if self.model == "stokes" and self.free else self.model
+
+    @property
+    def words(self) -> str:
+        """What it is called where a run is told of."""
+        return f"{self.model} in free space" if self.on_grid and self.free else self.model
+
+    @property
+    def free(self) -> bool:
+        """Whether its space has no bounds."""
+        return self.box == "free"
+
+    @property
+    def sides(self) -> tuple[float, float, float] | None:
+        """The sides of its periodic box; None where it has none."""
+        return None if isinstance(self.box, str) else self.box
 
     @property
     def inertial(self) -> bool:

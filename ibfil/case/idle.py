@@ -17,11 +17,11 @@ def idle_keys(case: Case) -> list[str]:
     fluid = case.fluid
     idle: dict[str, list[str]] = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
     if fluid.model == "rft":
-        grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "kernel", "slip"]
+        grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "spacing", "kernel", "slip"]
         idle["fluid"] += [*grid, "method", "precision"]
         spins = isinstance(fluid.drag, Matched) and fluid.rotation == "grid"
         idle["fluid"] += [] if spins and any(f.twisting for f in case.filaments.values()) else ["rotation"]
-        idle["output"] += ["grid_every", "fields", "grid_stride", "probes"]
+        idle["output"] += ["grid_every", "fields", "grid_stride", "window", "window_at", "probes"]
     else:
         turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())
         spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None

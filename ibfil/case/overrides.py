@@ -1,4 +1,7 @@
-"""KEY=VALUE on the command line: one key of a case replaced, by its dotted path."""
+"""KEY=VALUE on the command line: one key of a case replaced, by its dotted path.
+
+KEY=absent takes the key out, which is what the listing of the schema calls a key that is not there.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from .faults import ROOT, Entry, Fault, dotted, members, shown, step_into, unkno
 from .toml import load
 
 NAMED = {"filament": "rod", "observe": "tip", "expect": "tip"}  # tables whose names are the user's, and such a name
+ABSENT = "absent"  # the value that takes a key out
 FORM = "KEY=VALUE, KEY a dotted path such as fluid.viscosity or stop.0.below"
 
 
@@ -27,7 +31,7 @@ def split(text: str) -> tuple[list[str], Any] | Fault:
 
 
 def apply(raw: dict[str, Any], path: list[str], value: Any) -> dict[str, Any] | Fault:
-    """The content ``raw`` with the key ``path`` set, making tables the schema knows; or the fault."""
+    """The content ``raw`` with the key ``path`` set or taken out, making tables the schema knows; or the fault."""
     changed = copy.deepcopy(raw)
     entry, table = ROOT, changed
     for depth, part in enumerate(path):
@@ -48,7 +52,9 @@ def apply(raw: dict[str, Any], path: list[str], value: Any) -> dict[str, Any] | 
         if here[0] in NAMED and depth == 1 and not last and part not in table and suggestion(part, table):
             return Fault(dotted(here), f"no such {here[0]}{suggestion(part, table)}", ", ".join(table))
         index = int(part) if isinstance(table, list) else part
-        if last:
+        if last and value == ABSENT and isinstance(table, dict):
+            table.pop(part, None)
+        elif last:
             table[index] = value
         elif isinstance(table, dict):
             table = table.setdefault(part, _empty(inner))

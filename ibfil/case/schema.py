@@ -25,6 +25,7 @@ from .values import (
     Range,
     Real,
     Seed,
+    Sizes,
     Vector,
     Whole,
 )
@@ -172,6 +173,8 @@ class Output(Table):
         ("velocity",), description="which fields"
     )
     grid_stride: Count = Field(1, description="every so many cells of a field")
+    window: Sizes | None = Field(None, description="sides of the part of free space whose fields are written")
+    window_at: Vector | None = Field(None, description="its middle; the origin by default")
     probes: Annotated[tuple[Vector, ...], Listed()] = Field((), description="points whose velocity is written")
     checkpoint_every: Positive = Field(60.0, description="wall seconds between checkpoints")
 

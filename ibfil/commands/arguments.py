@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from ..case.schema import Case
 
 DONE, FAILED, BAD_INPUT, CUT = 0, 1, 2, 130  # exit statuses
-CHANGES = "KEY=VALUE overrides one key of the case, by its dotted path: fluid.model=rft, stop.0.below=1e-3"
+CHANGES = (
+    "KEY=VALUE overrides one key of the case, by its dotted path: fluid.model=rft, stop.0.below=1e-3; "
+    "KEY=absent takes it out"
+)
 
 
 # --- kinds of arguments -----------------------------------------------------------------------------------------------

@@ -37,6 +37,7 @@ from ..grid.kernels import KERNELS
 from ..version import __version__
 from .coupling import TRANSLATION, Nodes
 from .immersed_boundary import slip_mobility
+from .spaces.free import FreeSpace
 from .spaces.periodic import PeriodicSpace
 from .torque_coupling import TorqueCoupling, spin_mobility
 
@@ -49,7 +50,7 @@ class Rod:
 
     length: float
     nodes: int
-    space: PeriodicSpace
+    space: PeriodicSpace | FreeSpace
     kernel: str
     slip: float
     radius: float = 0.0  # that it spins with, below the kernel's scale; 0: its spin is not asked for

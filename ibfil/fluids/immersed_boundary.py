@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from ..grid.kernels import Kernel
+from ..grid.spreading import Stencil
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from .base import Flow, Solution
@@ -59,7 +60,7 @@ class Immersed:
         """The self-mobility (n, c) of each node beyond the grid's response."""
         return self.coupling.own(self.slip)
 
-    def stencil(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def stencil(self, r: np.ndarray) -> Stencil:
         """First grid index (n, 3) and weights (n, 3, P) of the nodes r (n, 3)."""
         return self.space.stencil(self.kernel, r)
 

@@ -1,4 +1,4 @@
-"""The exact mobility of nodes on the grid, without the grid (fluids/README.md).
+"""The exact mobility of nodes in a fluid on a grid, without the grid (fluids/README.md).
 
 Weights of a node are products over the axes, so the velocity that a unit force at node q gives node p is
 
@@ -17,10 +17,12 @@ import numpy as np
 from numba import njit
 from scipy.fft import irfftn
 
+from ..grid.far_pairs import far_pair, is_far, moments
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol
 from ..linalg.vectors import NOT_NEGATIVE
 
+ALL = 2**62  # a reach that no pair is beyond
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SIX = (0,) * 6
 
@@ -41,10 +43,14 @@ class Octant(NamedTuple):
     """The octant of a response that every pair of nodes can be mirrored into.
 
     ``values`` (x, y, z and part) have a rim of a kernel's points less one; distances are taken modulo ``cells`` (3,).
+    Pairs whose indices differ by ``reach`` or more on an axis are no part of it, in free space, but Oseen's tensor:
+    G, R and W of it times ``scales`` (3,). Where the fluid is periodic ``reach`` is beyond all of them.
     """
 
     values: np.ndarray
     cells: np.ndarray
+    reach: int = ALL
+    scales: np.ndarray = np.ones(3)
 
 
 def octant(response: np.ndarray, points: int, number: type = np.float64) -> Octant:
@@ -127,15 +133,24 @@ def sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points):
     return sign
 
 
+@njit(cache=True, inline="always")
+def sum_any(octant, base, weights, centres, a, b, c, acc, sums, unit, points):
+    """The same of pairs near and far; ``centres`` are the moments of the nodes' weights (grid/far_pairs.py)."""
+    if is_far(base, a, b, octant.reach):
+        far_pair(centres[0], centres[1], a, b, octant.scales, sums)
+        return 1.0, 1.0, 1.0
+    return sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points)
+
+
 @njit(cache=True)
 def _pairs(octant, base, weights, slip, rows, columns, points):
-    terms = 2 * len(points) - 1
+    terms, centres = 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((rows.size, 3, columns.size, 3))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            sum_pair(octant, base, weights, a, b, c, acc, sums, _SIX, points)
+            sum_any(octant, base, weights, centres, a, b, c, acc, sums, _SIX, points)
             for x in range(3):
                 out[i, x, j, x] = sums[x] + (slip[a] if a == b else 0.0)
             out[i, 0, j, 1] = out[i, 1, j, 0] = sums[3]
@@ -146,12 +161,12 @@ def _pairs(octant, base, weights, slip, rows, columns, points):
 
 @njit(cache=True)
 def _mobility(octant, base, weights, slip, points):
-    n, terms = weights.shape[0], 2 * len(points) - 1
+    n, terms, centres = weights.shape[0], 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((n, 3, n, 3))
     for a in range(n):
         for b in range(a, n):
-            sum_pair(octant, base, weights, a, b, c, acc, sums, _SIX, points)
+            sum_any(octant, base, weights, centres, a, b, c, acc, sums, _SIX, points)
             for x in range(3):
                 out[a, x, b, x] = out[b, x, a, x] = sums[x]
             out[a, 0, b, 1] = out[b, 0, a, 1] = out[a, 1, b, 0] = out[b, 1, a, 0] = sums[3]

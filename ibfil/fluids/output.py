@@ -8,9 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from ..rods.geometry import Configuration
+from .base import Fluid
 from .coupling import Nodes
 from .fields import GridFields
-from .immersed_boundary import Immersed
+from .immersed_boundary import Immersed, ImmersedResponse
 from .resistive_force import ResistiveForce
 
 
@@ -49,22 +50,32 @@ class DragOutput:
         return None
 
 
+class FieldSource(Protocol):
+    """A source of fields at the points where they are written."""
+
+    def evaluate(
+        self, base: np.ndarray, weights: np.ndarray, force: np.ndarray, time: float, names: Sequence[str]
+    ) -> dict[str, np.ndarray]:
+        """The fields in ``names`` that forces (n, 3), or forces and torques (n, 6), drive; of nodes with stencils."""
+
+
+def _pushes(immersed: Immersed, configuration: Configuration, force: np.ndarray) -> tuple[Nodes, np.ndarray]:
+    """The nodes, and the vectors that they put onto the grid."""
+    nodes = immersed.nodes(configuration.r, configuration.e3)
+    return nodes, immersed.coupling.to_grid(nodes.axes, force)
+
+
 class GridOutput:
     """Of a fluid on a grid: eta int |grad u|^2, the nodes' side of it, and fields. Each costs an evaluation."""
 
     def __init__(self, immersed: Immersed, fields: GridFields) -> None:
         self._immersed, self._fields = immersed, fields
 
-    def _pushes(self, configuration: Configuration, force: np.ndarray) -> tuple[Nodes, np.ndarray]:
-        """The nodes, and the vectors that they put onto the grid."""
-        nodes = self._immersed.nodes(configuration.r, configuration.e3)
-        return nodes, self._immersed.coupling.to_grid(nodes.axes, force)
-
     def dissipation(
         self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
     ) -> dict[str, float | np.ndarray]:
         """The fluid's heat, the power of the nodes upon the grid, and what slip takes between the two."""
-        nodes, vectors = self._pushes(configuration, force)
+        nodes, vectors = _pushes(self._immersed, configuration, force)
         heat, power = self._fields.dissipation(*nodes.stencil, vectors)
         own = self._immersed.own
         return {
@@ -77,5 +88,33 @@ class GridOutput:
         self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray] | None:
         """Fields on the grid: one evaluation of the fluid."""
-        nodes, vectors = self._pushes(configuration, force)
+        nodes, vectors = _pushes(self._immersed, configuration, force)
+        return self._fields.evaluate(*nodes.stencil, vectors, time, names)
+
+
+class SpaceOutput:
+    """Of Stokes flow in a space without end: all that nodes do is heat; fields in a window, where there is one."""
+
+    def __init__(self, immersed: Immersed, fluid: Fluid, fields: FieldSource | None) -> None:
+        self._immersed, self._fluid, self._fields = immersed, fluid, fields
+
+    def dissipation(
+        self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
+    ) -> dict[str, float | np.ndarray]:
+        """F.M F, the fluid's heat and the power of the nodes upon it in one, and what slip takes besides."""
+        own, c = self._immersed.own, self._immersed.coupling.components
+        response = self._fluid.response(configuration.r, configuration.e3, time, 1.0)
+        assert isinstance(response, ImmersedResponse)
+        pushed = np.ascontiguousarray(force[:, :c])
+        slip = float(np.sum(own * pushed**2))
+        power = float(pushed.ravel() @ response.apply(pushed.ravel())) - slip
+        return {"dissipation": power, "grid_power": power, "slip_power": slip}
+
+    def evaluate(
+        self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
+    ) -> dict[str, np.ndarray] | None:
+        """Fields in the window."""
+        if self._fields is None:
+            return None
+        nodes, vectors = _pushes(self._immersed, configuration, force)
         return self._fields.evaluate(*nodes.stencil, vectors, time, names)

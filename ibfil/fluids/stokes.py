@@ -27,6 +27,7 @@ from .condensation import Reduced
 from .coupling import Nodes
 from .immersed_boundary import Immersed, ImmersedResponse
 from .preconditioner import Asked, Matrix, Preconditioner, RodByRod, WholeMatrix
+from .spaces.base import velocity_of
 
 
 class Solver(Protocol):
@@ -116,13 +117,9 @@ class Tabulated(Memoryless, ABC):
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
     ) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of forces (n, m) at r (n, 3)."""
-        immersed, k, n = self.immersed, len(points), len(r)
-        coupling, c = immersed.coupling, immersed.coupling.components
-        axes = np.concatenate([np.zeros_like(points), coupling.axes(e3)])
-        nodes = Nodes(*immersed.stencil(np.concatenate([points, r])), axes)
-        rows, columns = np.arange(k), np.arange(k, k + n)
-        block = self._mobility.block(nodes, np.zeros((k + n, c)), rows, columns)
-        u = (block @ force[:, :c].ravel()).reshape(k, c)[:, :3]
+        immersed, coupling = self.immersed, self.immersed.coupling
+        places, nodes = immersed.stencil(points), immersed.nodes(r, e3)
+        u = velocity_of(self._mobility, coupling, places, nodes, force[:, : coupling.components])
         return u if immersed.flow is None else u + immersed.flow(points, time)
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> ImmersedResponse:

@@ -36,11 +36,12 @@ import numpy as np
 from numba import njit
 from scipy.fft import irfftn
 
+from ..grid.far_pairs import moments
 from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol, half_curl, project
 from ..grid.spreading import interpolate, spread
-from .mobility_table import COMPONENTS, Octant, point_response, sum_pair
+from .mobility_table import COMPONENTS, Octant, point_response, sum_any
 from .velocity_gradient import advected
 
 if TYPE_CHECKING:
@@ -79,13 +80,13 @@ def _between(sums, sign, d, e):
 
 @njit(cache=True)
 def _pairs(octant, base, weights, axes, own, rows, columns, points):
-    terms = 2 * len(points) - 1
+    terms, centres = 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
     out = np.empty((rows.size, 4, columns.size, 4))
     for i in range(rows.size):
         for j in range(columns.size):
             a, b = rows[i], columns[j]
-            sign = sum_pair(octant, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
+            sign = sum_any(octant, base, weights, centres, a, b, c, acc, sums, _FIFTEEN, points)
             if a == b:
                 sums[6:9] = 0.0  # odd, and so nothing but round-off
             for x in range(3):
@@ -104,12 +105,12 @@ def _pairs(octant, base, weights, axes, own, rows, columns, points):
 
 @njit(cache=True)
 def _mobility(octant, base, weights, axes, own, points):
-    n, terms = weights.shape[0], 2 * len(points) - 1
+    n, terms, centres = weights.shape[0], 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
     out = np.empty((n, 4, n, 4))
     for a in range(n):
         for b in range(a, n):
-            sign = sum_pair(octant, base, weights, a, b, c, acc, sums, _FIFTEEN, points)
+            sign = sum_any(octant, base, weights, centres, a, b, c, acc, sums, _FIFTEEN, points)
             if a == b:
                 sums[6:9] = 0.0  # odd, and so nothing but round-off
             for x in range(3):

@@ -1,7 +1,7 @@
-"""The periodic grid: where its points are, and its wave numbers.
+"""Points of grids: a lattice, and the periodic grid with its wave numbers.
 
-Points lie at x_j = (j - n // 2) h on each axis, so the box is centred on the origin and a grid point is at the
-origin. Positions are unwrapped; indices are taken modulo the number of cells.
+Points of the periodic grid lie at x_j = (j - n // 2) h on each axis, so the box is centred on the origin and a point is
+at the origin. Positions are unwrapped; indices are taken modulo the number of cells.
 """
 
 from __future__ import annotations
@@ -34,23 +34,29 @@ def cells_for(box: Sequence[float], largest: float) -> tuple[int, int, int] | No
     return None
 
 
-class Grid:
-    """A periodic box (3,) of cubic cells: ``cells`` (3,), ``spacing`` h, ``origin`` of grid index (0, 0, 0)."""
+class Lattice:
+    """Points of cubic cells: ``cells`` (3,) along each axis, ``spacing`` h, ``origin`` (3,) of index (0, 0, 0)."""
 
-    def __init__(self, box: Sequence[float], cells: Sequence[int]) -> None:
-        self.cells = np.array(cells, np.int64)
-        self.box = np.array(box, float)
-        self.spacing = float(self.box[0] / self.cells[0])
-        self.origin = -(self.cells // 2) * self.spacing
-
-    def coordinates(self, r: np.ndarray) -> np.ndarray:
-        """Positions (n, 3) in units of the spacing, from grid index (0, 0, 0)."""
-        return r / self.spacing + self.cells // 2
+    def __init__(self, cells: Sequence[int], spacing: float, origin: np.ndarray) -> None:
+        self.cells, self.spacing, self.origin = np.array(cells, np.int64), spacing, origin
 
     def points(self) -> np.ndarray:
         """Places (nx ny nz, 3) of the grid points."""
         axes = [start + self.spacing * np.arange(n) for start, n in zip(self.origin, self.cells, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+class Grid(Lattice):
+    """A periodic ``box`` (3,) of cubic cells."""
+
+    def __init__(self, box: Sequence[float], cells: Sequence[int]) -> None:
+        self.box = np.array(box, float)
+        spacing = float(self.box[0] / cells[0])
+        super().__init__(cells, spacing, -(np.array(cells, np.int64) // 2) * spacing)
+
+    def coordinates(self, r: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) in units of the spacing, from grid index (0, 0, 0)."""
+        return r / self.spacing + self.cells // 2
 
     def wave_numbers(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """For each axis the wave numbers of derivatives, and the true k^2; the last axis is halved (real fields)."""

@@ -149,7 +149,7 @@ def _banner(simulation: Simulation, overview: Overview) -> Iterator[str]:
     if case.title:
         yield case.title
     scheme = f"{case.time.scheme} of order {case.time.order}"
-    yield f"fluid {case.fluid.model}, method {simulation.method}, {scheme}"
+    yield f"fluid {case.fluid.words}, method {simulation.method}, {scheme}"
     if overview.groups:
         yield "  ".join(f"{name} = {value:.4g}" for name, value in overview.groups.items())
     for warning in overview.warnings:

@@ -113,7 +113,7 @@ class Diagnostics:
             "steps_shortened": float(now.shortened),
         }
         case, fluid = self._model.case, self._model.fluid
-        if case.output.probes and self._model.grid is not None:
+        if case.output.probes and case.fluid.on_grid:
             points = np.array(case.output.probes)
             pushed = self._pushed(now)
             out["probe_velocity"] = fluid.velocity_at(points, configuration.r, configuration.e3, pushed, now.state.time)

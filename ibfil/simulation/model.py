@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..case.schema import Case
     from ..fluids.base import Fluid
     from ..fluids.wrapped.thickness import Thickness
-    from ..grid.periodic_grid import Grid
+    from ..grid.periodic_grid import Lattice
     from ..rods.constitutive import MomentLaw
     from ..timestepping.base import Stepper
     from ..timestepping.brownian import Noise
@@ -44,8 +44,8 @@ class Model:
     stepper: Stepper
 
     @property
-    def grid(self) -> Grid | None:
-        """The fluid's grid; None where it has none."""
+    def grid(self) -> Lattice | None:
+        """The points at which the fluid's fields are written; None where there are none."""
         return self.fluid_model.grid
 
     def nodes(self, name: str) -> slice:

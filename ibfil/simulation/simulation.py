@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..assembly.stacked import RodStack
     from ..case.schema import Case
     from ..fluids.base import Fluid
-    from ..grid.periodic_grid import Grid
+    from ..grid.periodic_grid import Lattice
     from ..io.snapshots import Snapshot
     from ..rods.constitutive import MomentLaw
     from ..rods.system import RodSystem
@@ -74,8 +74,8 @@ class Simulation:
         return self.model.fluid
 
     @property
-    def grid(self) -> Grid | None:
-        """The fluid's grid; None where it has none."""
+    def grid(self) -> Lattice | None:
+        """The points at which the fluid's fields are written; None where there are none."""
         return self.model.grid
 
     @property

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..analysis import periodic_images
 from ..analysis.energy import elastic_energy
+from ..analysis.meshes import box_of
 from ..errors import CaseError
 from ..io.overwriting import BY_ENDING, Kind, replacing
 from ..io.units import label
@@ -150,10 +151,14 @@ def _flow(fig: Figure, axes: Axes, run: RunFile, positions: Sequence[np.ndarray]
     time, velocity = float(grid.time[-1]), grid.fields["velocity"][-1].astype(float)
     output = int(np.argmin(np.abs(run.time - time)))
     cells = np.array(velocity.shape[:3])
-    nodes = [wrapped(position[output], grid.origin, cells * grid.spacing) for position in positions]
+    box = box_of(run)
+    nodes = [position[output] for position in positions]
+    if box is not None:
+        nodes = [wrapped(r, grid.origin, cells * grid.spacing) for r in nodes]
     across = 3 - sum(plane)
     middle = float(np.nanmean(np.concatenate(nodes)[:, across]))
-    level = round((middle - grid.origin[across]) / grid.spacing[across]) % cells[across]
+    level = round((middle - grid.origin[across]) / grid.spacing[across])
+    level = level % cells[across] if box is not None else int(np.clip(level, 0, cells[across] - 1))
     sheet = velocity.take(level, axis=across).swapaxes(0, 1)  # [b, a]
     a, b = (grid.origin[d] + grid.spacing[d] * np.arange(cells[d]) for d in plane)
 
@@ -186,7 +191,7 @@ def _window(values: Sequence[np.ndarray], axis: np.ndarray) -> tuple[float, floa
     """The filaments' reach along an axis and as much again; at least 0.6 of the axis, at most all of it."""
     low, high = (float(f([f(v) for v in values])) for f in (np.nanmin, np.nanmax))
     half = max(high - low, 0.3 * (axis[-1] - axis[0]))
-    middle = 0.5 * (low + high)
+    middle = float(np.clip(0.5 * (low + high), axis[0], axis[-1]))
     return max(middle - half, float(axis[0])), min(middle + half, float(axis[-1]))
 
 

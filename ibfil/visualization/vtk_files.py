@@ -80,7 +80,7 @@ class Collection:
         """Have every output of the run so far in the collection; whether the run is still running."""
         with RunFile(self.run) as run:
             if self.view != PLAIN and box_of(run) is None:
-                allowed = "a run on a grid; rft has no periodic box"
+                allowed = "a run in a periodic box, which rft and free space have not"
                 raise CaseError([f"{self.run}: found --wrap or --images; allowed: {allowed}"])
             if run.created != self._created:
                 self.filaments, self.fields, self._created = [], [], run.created

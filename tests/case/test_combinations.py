@@ -12,6 +12,7 @@ ROD = "filament.rod"
 TWISTED = [f"{ROD}.twisting=1", f"{ROD}.radius=0.01"]
 STOKES = ["fluid.model=stokes", "fluid.box=[4, 4, 4]", "fluid.cells=[40, 40, 40]"]
 NAVIER = ["fluid.model=navier-stokes", "fluid.density=1", *STOKES[1:]]
+FREE = ["fluid.model=stokes", "fluid.box=free", "fluid.spacing=0.1"]
 SPEED = ["observe.v.kind=speed"]
 THERMAL = ["thermal.energy=1"]
 EXPECT = [*SPEED, "expect.e.observe=v"]
@@ -106,6 +107,18 @@ COMBINATIONS = [
     (["fluid.box=[4, 4, 4]", "fluid.cells=[40, 40, 41]"], "fluid.cells", "one h on all axes"),
     ([*STOKES, "fluid.cells=[3, 3, 3]"], "fluid.cells", "width of peskin4"),
     ([*STOKES, "fluid.cells=[5, 5, 5]", "fluid.kernel=bkp6"], "fluid.cells", "at least 6"),
+    ([*STOKES, "fluid.spacing=0.1"], "fluid.spacing", 'only with box = "free"'),
+    ([*FREE, "fluid.cells=[8, 8, 8]"], "fluid.cells", "thickness or spacing there"),
+    ([*FREE, "fluid.thickness=0.1"], "fluid.thickness", "one of them"),
+    (FREE[:2], "fluid.spacing", "thickness or spacing"),
+    ([*FREE, "fluid.method=pruned"], "fluid.method", 'allowed: "auto", "table", "fft" or "krylov"'),
+    ([*FREE, "fluid.model=navier-stokes", "fluid.density=1"], "fluid.box", '"free" needs stokes'),
+    ([*FREE, "output.grid_every=1"], "output.window", "three lengths"),
+    ([*FREE, "output.window=[1, 1, 1]"], "output.window", "grid_every"),
+    ([*FREE, "output.grid_every=1", "output.window_at=[1, 1, 1]"], "output.window_at", "only with window"),
+    ([*FREE, "output.grid_every=1", "output.window=[1e4, 1e4, 1e4]"], "output.window", "GiB"),
+    ([*STOKES, "output.grid_every=1", "output.window=[1, 1, 1]"], "output.window", 'only with box = "free"'),
+    (["fluid.drag.matched=0.5", "fluid.box=free"], "fluid.spacing", "thickness or spacing"),
     ([*STOKES, "fluid.model=navier-stokes"], "fluid.density", "navier-stokes"),
     ([*NAVIER, "fluid.flow=['y', 0, 0]"], "fluid.flow", "box-periodic"),
     ([*NAVIER, "fluid.flow=['sin(2*pi*y/3)', 0, 0]"], "fluid.flow", "box-periodic"),
@@ -218,6 +231,10 @@ SOUND = [
     [f"{ROD}.shape={{kind='helix', radius=1, pitch=1}}", "fluid.flow=['z', 'x', 'y']"],
     THERMAL,
     [*STOKES, "fluid.box=[4, 2, 6]", "fluid.cells=[40, 20, 60]"],
+    [*FREE, "fluid.flow=['y', 0, 0]", "output.grid_every=1", "output.window=[1, 2, 3]", "output.window_at=[0, 9, 0]"],
+    [*FREE[:2], "fluid.thickness=0.1", *TWISTED, "fluid.rotation=grid", "fluid.method=krylov"],
+    ["fluid.drag.matched=0.5", "fluid.box=free", "fluid.spacing=0.05"],
+    ["fluid.box=free"],
     [*STOKES, "fluid.box=[3.2, 0.3, 0.3]", "fluid.cells=[32, 3, 3]", "fluid.kernel=roma3"],
     [*NAVIER, "fluid.flow=['sin(2*pi*y/4)*cos(t)', 'cos(pi*x)', 1]"],
     [*STOKES, "fluid.flow=['y', 0, 0]"],

@@ -9,6 +9,7 @@ import pytest
 from helpers.example_cases import SHORT, SWIMMER, case, faults
 
 from ibfil.case.reading import differences, quick_case
+from ibfil.errors import CaseError
 
 
 def test_overrides_change_the_case_and_its_text():
@@ -36,6 +37,17 @@ def test_overrides_change_the_case_and_its_text():
     assert raw["time"]["end"] == "3*v"
     assert raw["fluid"]["box"] == [4, 4, 4]
     assert case(text).time.end == 1.0
+
+
+def test_absent_takes_a_key_out():
+    changed = case(SHORT, "fluid.model=stokes", "fluid.box=[4, 4, 4]", "fluid.cells=[40, 40, 40]")
+    back = case(changed.text, "fluid.cells=absent", "fluid.thickness=0.2", "fluid.kernel=absent")
+    assert (back.fluid.cells, back.fluid.thickness) == (None, 0.2)
+    assert "cells" not in tomllib.loads(back.text)["fluid"]
+    with pytest.raises(CaseError, match=r"fluid\.viscosity"):
+        case(SHORT, "fluid.viscosity=absent")
+    with pytest.raises(CaseError, match=r"fluid\.viscocity"):
+        case(SHORT, "fluid.viscocity=absent")
 
 
 def test_a_deep_override_is_a_text():

@@ -20,6 +20,7 @@ from ibfil.check.warnings import warnings
 from ibfil.errors import CaseError
 from ibfil.fluids import calibrated_drag, mobility_table
 from ibfil.fluids.calibrated_drag import Match, Rod, directions, measure, places
+from ibfil.fluids.spaces.free import FreeSpace
 from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
@@ -50,6 +51,14 @@ def test_known_numbers(length, cells, perp, par):
     assert found.perp == pytest.approx(perp, rel=5e-3)
     assert found.par == pytest.approx(par, rel=5e-3)
     assert found.ratio == pytest.approx(perp / par, rel=5e-3)
+    assert 0 < found.scatter < 0.02
+
+
+@pytest.mark.parametrize(("length", "perp", "par"), [(1.0, 3.531, 2.407), (0.5, 4.473, 3.235)])
+def test_known_numbers_of_free_space(length, perp, par):
+    """Independent code, with slip: a fifth below those of a box of 3.2."""
+    found = measure(Rod(length, round(length * 40) + 1, FreeSpace(0.025), "peskin4", 0.01))
+    assert (found.perp, found.par) == pytest.approx((perp, par), rel=5e-4)
     assert 0 < found.scatter < 0.02
 
 
@@ -152,7 +161,15 @@ def test_what_was_measured_is_not_measured_again(monkeypatch, cache):
     monkeypatch.setattr(calibrated_drag, "measure", never)
     assert again(SMALL) == found
     wider = PeriodicSpace((1.6, 1.6, 3.2), (32, 32, 64))
-    for change in ({"length": 0.4}, {"nodes": 12}, {"space": wider}, {"kernel": "es5"}, {"slip": 0.02}):
+    free = FreeSpace(SMALL.space.spacing)
+    for change in (
+        {"length": 0.4},
+        {"nodes": 12},
+        {"space": wider},
+        {"space": free},
+        {"kernel": "es5"},
+        {"slip": 0.02},
+    ):
         with pytest.raises(AssertionError, match="measured"):
             again(Rod(**{**SMALL.__dict__, **change}))
 

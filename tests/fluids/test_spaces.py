@@ -7,12 +7,13 @@ import pytest
 
 from ibfil.fluids.coupling import TRANSLATION, Coupling, Nodes
 from ibfil.fluids.spaces.base import Space
+from ibfil.fluids.spaces.free import FreeSpace
 from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.torque_coupling import TorqueCoupling
 from ibfil.grid.kernels import KERNELS
 
 COUNT = 7
-SPACES: dict[str, Space] = {"periodic": PeriodicSpace((1.2, 1.4, 1.6), (12, 14, 16))}
+SPACES: dict[str, Space] = {"periodic": PeriodicSpace((1.2, 1.4, 1.6), (12, 14, 16)), "free": FreeSpace(0.1)}
 EACH = pytest.mark.parametrize("space", SPACES.values(), ids=SPACES)
 
 

@@ -41,18 +41,31 @@ every = "pi/100"
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     folder = tmp_path_factory.mktemp("compare")
-    fluids = ("rft", "matched", "stokes", "navier-stokes")
+    fluids = ("rft", "matched", "stokes", "navier-stokes", "free")
     return compare(SWIMMER, fluids, folder, log=lambda line: None), folder
 
 
 def test_every_fluid_of_the_schema_can_be_asked_for():
-    assert known_fluids() == ("rft", "matched", "slender", "stokes", "navier-stokes")
+    assert known_fluids() == ("rft", "matched", "slender", "free", "stokes", "navier-stokes")
     case = parse_case(SWIMMER, "s")
     assert fluid_overrides("matched", case) == ("fluid.model=rft", "fluid.drag={matched=1.0}")
     own = parse_case(SWIMMER, "s", ["fluid.drag={matched=2.0}"])
     assert fluid_overrides("matched", own) == ("fluid.model=rft",)
     assert fluid_overrides("rft", own) == ("fluid.model=rft", "fluid.drag=paper")
     assert fluid_overrides("rft", case) == ("fluid.model=rft",)
+
+
+def test_between_a_box_and_free_space_the_spacing_is_kept():
+    boxed = parse_case(SWIMMER, "s", ["output.grid_every=1"])
+    free = parse_case(SWIMMER, "s", ["output.grid_every=1", *fluid_overrides("free", boxed)])
+    assert (free.fluid.box, free.fluid.cells, free.fluid.spacing) == ("free", None, 2.0 / 24)
+    assert free.output.window == (2.0, 2.0, 2.0)
+    assert fluid_overrides("free", free) == ("fluid.model=stokes",)
+    back = parse_case(SWIMMER, "s", [*fluid_overrides("free", boxed), *fluid_overrides("navier-stokes", free)])
+    assert back.fluid.cells == (36, 36, 36)  # three times its length, and the spacing again
+    assert back.fluid.box == pytest.approx((3.0, 3.0, 3.0))
+    assert back.fluid.spacing is None
+    assert back.output.window is None
 
 
 def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(result):
@@ -74,6 +87,8 @@ def test_the_table_has_a_column_a_fluid_and_both_sides_of_the_power(result):
     for fluid in by:
         assert by[fluid]["speed"].value > 0
         assert by[fluid]["wall time a unit of time"].value > 0
+    # Images a box of two lengths away change the speed of a swimmer by no more than some per cent.
+    assert 0 < abs(by["free"]["speed"].value / by["stokes"]["speed"].value - 1) < 0.1
     assert "distance from the first, rms/L" not in by["rft"]
     assert (
         by["stokes"]["distance from the first, rms/L"].value > by["stokes"]["the same without rigid motion"].value > 0

@@ -20,6 +20,7 @@ from ibfil.rods.system import RodSystem
 
 GRID = {"model": "stokes", "box": [1.6, 2.0, 1.8], "cells": [16, 20, 18], "slip": 0.01}
 FLOW = ["0.3 + y", "sin(x + t)", "0"]
+FREE = {"model": "stokes", "box": "free", "spacing": 0.1, "slip": 0.01}
 INERTIA = {**GRID, "model": "navier-stokes", "density": 3.0}
 PERIODIC = ["0.3", "sin(2*pi*x/1.6 + t)", "0"]
 # The case's [fluid], and how closely one implicit() satisfies the statement, relative to the move.
@@ -35,6 +36,12 @@ FLUIDS: dict[str, tuple[dict[str, Any], float]] = {
     "stirred table in a flow": ({**GRID, "method": "table", "rotation": "grid", "flow": FLOW}, 1e-11),
     "stirred fft": ({**GRID, "method": "fft", "rotation": "grid", "kernel": "es4"}, 1e-10),
     "stirred krylov": ({**GRID, "method": "krylov", "rotation": "grid"}, 1e-4),
+    "free table": ({**FREE, "method": "table"}, 1e-11),
+    "free table in a flow": ({**FREE, "method": "table", "kernel": "bkp6", "flow": FLOW}, 1e-11),
+    "free fft": ({**FREE, "method": "fft", "flow": FLOW}, 1e-10),
+    "free krylov": ({**FREE, "method": "krylov"}, 1e-4),
+    "free stirred table": ({**FREE, "method": "table", "rotation": "grid", "flow": FLOW}, 1e-11),
+    "free stirred fft": ({**FREE, "method": "fft", "rotation": "grid"}, 1e-10),
     "navier-stokes table": ({**INERTIA, "method": "table"}, 1e-11),
     "navier-stokes in a flow": ({**INERTIA, "method": "table", "kernel": "es5", "flow": PERIODIC}, 1e-11),
     "navier-stokes fft": ({**INERTIA, "method": "fft", "flow": PERIODIC}, 1e-10),

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from ...fluids.base import Flow, Fluid
     from ...fluids.output import FluidOutput
     from ...fluids.resistive_force import Drag
-    from ...fluids.stokes import StokesSolve
-    from ...grid.periodic_grid import Grid
+    from ...fluids.spaces.flow_of_forces import FlowOfForces
+    from ...grid.periodic_grid import Lattice
     from ...io.snapshots import Snapshot
     from ...rods.geometry import Configuration
     from ..stacked import RodStack
@@ -71,8 +71,8 @@ class FluidModel(ABC):
         """Its outputs besides the motion of the rods."""
 
     @cached_property
-    def grid(self) -> Grid | None:
-        """Its grid; None where it has none."""
+    def grid(self) -> Lattice | None:
+        """The points at which its fields are written; None where there are none."""
         return None
 
     @cached_property
@@ -174,6 +174,6 @@ class FluidModel(ABC):
 
     flow_from_forces = False  # whether recorded forces alone tell the flow at any point
 
-    def solve_for_flow(self) -> StokesSolve:
+    def solve_for_flow(self) -> FlowOfForces:
         """The solver for the velocity that recorded forces drive. Only where ``flow_from_forces``."""
         raise NotImplementedError(self.case.fluid.model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,16 @@ CELLS_A_WAVE = 15  # wavelength/h below which the kernel is too wide for the mot
 TWIST_RADIUS_SHARE = 0.98  # of the grid's: above, a rod's own spin does not keep its torques from locking
 THICKNESS = 1.25  # ratio of a rod's radius and the grid's up to which they are taken for one
 FLOW_JUMP = 1e-6  # jump of a background flow between opposite faces, of its size, that is none
+
+
+def finer(case: Case) -> str:
+    """The words for a finer grid."""
+    return "a smaller fluid.spacing" if case.fluid.free else "more fluid.cells"
+
+
+def coarser(case: Case) -> str:
+    """The words for a coarser one."""
+    return "a larger fluid.spacing" if case.fluid.free else "fewer fluid.cells"
 
 
 def wave_number(filament: Filament) -> float:
@@ -50,22 +60,22 @@ def of_nodes(case: Case, name: str, groups: Mapping[str, float]) -> list[str]:
         out.append(
             f"{key}: nodes are {apart:.2g} cells apart and fluid.slip = 0: below {LOCKING_SPACING} a nearly "
             "inextensible rod locks, and moves wrongly without any sign of trouble; "
-            "set fluid.slip = 0.01, or take fewer nodes or more cells"
+            f"set fluid.slip = 0.01, or take fewer nodes or {finer(case)}"
         )
     if apart > BEADS_SPACING:
         out.append(
             f"{key}: nodes are {apart:.2g} cells apart: beyond {BEADS_SPACING} it is a row of beads, and fluid passes "
-            "between (at 4 cells with 5 % less drag across); take more nodes, or fewer fluid.cells"
+            f"between (at 4 cells with 5 % less drag across); take more nodes, or {coarser(case)}"
         )
     if thick > SLENDER_RADIUS:
         out.append(
             f"{key}: a/L = {thick:.2g}: on this grid it is less than {0.5 / SLENDER_RADIUS:g} times as long as it "
-            "is thick, no slender rod; take more fluid.cells"
+            f"is thick, no slender rod; take {finer(case)}"
         )
     if groups.get("wavelength/h", np.inf) < CELLS_A_WAVE:
         out.append(
             f"{key}: {groups['wavelength/h']:.3g} cells a wavelength (wavelength/h): below {CELLS_A_WAVE} the "
-            "rod is as thick as its waves; take more fluid.cells"
+            f"rod is as thick as its waves; take {finer(case)}"
         )
     return out
 
@@ -88,7 +98,7 @@ def of_spin(case: Case, name: str) -> list[str]:
     return [
         *out,
         f"{key}.radius: {largest:.4g} is above {widest:.4g}, the radius that a rod on this grid has when it spins: "
-        'it spins as one of that; take fewer fluid.cells, a wider fluid.kernel, or fluid.rotation = "local"',
+        f'it spins as one of that; take {coarser(case)}, a wider fluid.kernel, or fluid.rotation = "local"',
     ]
 
 
@@ -129,8 +139,8 @@ def back_pressure(grid: Grid, scene: Scene) -> np.ndarray | None:
     return net / float(np.prod(grid.box))
 
 
-def of_net_force(grid: Grid, scene: Scene) -> list[str]:
-    """A net force, which a uniform back pressure carries."""
+def of_net_force(grid: Grid, scene: Scene, cure: Callable[[float], str]) -> list[str]:
+    """A net force, which a uniform back pressure carries; ``cure`` of its size: what it does, and what to change."""
     pressure = back_pressure(grid, scene)
     if pressure is None:
         return []
@@ -140,8 +150,7 @@ def of_net_force(grid: Grid, scene: Scene) -> list[str]:
     return [
         f"fluid.box: the rods push the fluid with a net force of {net:.3g} at the start (0 where nothing outside "
         f"pulls or holds them); on a periodic box a uniform back pressure gradient "
-        f"({', '.join(f'{p:.3g}' for p in seen)}) carries it, so that "
-        "there is no mean flow; a larger box makes it weaker, in proportion to the volume"
+        f"({', '.join(f'{p:.3g}' for p in seen)}) carries it, so that there is no mean flow; {cure(net)}"
     ]
 
 

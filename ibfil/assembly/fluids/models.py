@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .base import FluidModel
+from .free_space import FreeModel
 from .navier_stokes import NavierStokesModel
 from .resistive_force import ResistiveForceModel
 from .stokes import StokesModel
@@ -15,10 +16,11 @@ if TYPE_CHECKING:
 MODELS: dict[str, type[FluidModel]] = {
     "rft": ResistiveForceModel,
     "stokes": StokesModel,
+    "free": FreeModel,
     "navier-stokes": NavierStokesModel,
 }
 
 
 def fluid_model(case: Case) -> FluidModel:
     """The model of the fluid that the case names."""
-    return MODELS[case.fluid.model](case)
+    return MODELS[case.fluid.kind](case)

@@ -99,6 +99,10 @@ class GridModel(ImmersedModel):
 
     # -- what is told
 
+    def of_images(self, force: float) -> str:
+        """Words for what a net ``force`` on the box does, and what there is against it."""
+        return "a larger box makes it weaker, in proportion to the volume"
+
     def size(self) -> list[str]:
         """The grid, and how thick rods and nodes are on it."""
         return [f"grid {' x '.join(str(n) for n in self.grid.cells)}, h = {self.grid.spacing:.4g}", *super().size()]
@@ -109,7 +113,10 @@ class GridModel(ImmersedModel):
 
     def warnings(self, scene: Scene) -> list[str]:
         """A net force that a back pressure carries, a flow that is not periodic."""
-        return [*grid_warnings.of_net_force(self.grid, scene), *grid_warnings.of_flow(self.grid, self.flow)]
+        return [
+            *grid_warnings.of_net_force(self.grid, scene, self.of_images),
+            *grid_warnings.of_flow(self.grid, self.flow),
+        ]
 
     # -- pictures and recorded runs
 

@@ -66,7 +66,8 @@ class ResistiveForceModel(FluidModel):
         out = ["resistive-force drag on each node; no flow between nodes"]
         calibrated = self.case.fluid.calibrated
         if calibrated is not None:
-            out.append(f"its coefficients those of a straight rod of length {calibrated.matched:g} in the case's grid")
+            where = "in free space" if self.case.fluid.free else "in the case's periodic box"
+            out.append(f"its coefficients those of a straight rod of length {calibrated.matched:g} {where}")
         return out
 
     def absent(self) -> list[str]:
@@ -92,7 +93,8 @@ class ResistiveForceModel(FluidModel):
         scatter = groups.get("matched scatter", 0.0)
         if scatter <= DRAG_SCATTER:
             return []
+        larger = "" if self.case.fluid.free else " or a larger fluid.box"
         return [
             f"filament.{name}: the drag of a straight rod differs by {scatter:.2g} of itself between places in a cell "
-            "and directions: set fluid.slip = 0.01, or take a wider fluid.kernel or a larger fluid.box"
+            f"and directions: set fluid.slip = 0.01, or take a wider fluid.kernel{larger}"
         ]

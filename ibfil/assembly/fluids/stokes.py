@@ -12,7 +12,7 @@ from .on_grid import GridModel
 if TYPE_CHECKING:
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
-    from ...fluids.stokes import StokesSolve
+    from ...fluids.spaces.flow_of_forces import FlowOfForces
     from ..stacked import RodStack
 
 
@@ -44,14 +44,19 @@ class StokesModel(GridModel):
             *super().modelled(),
         ]
 
+    def of_images(self, force: float) -> str:
+        """Hasimoto's 2.837297 F/(6 pi eta L) by which the images of a cubic box of side L slow what is pulled."""
+        side = float(np.prod(self.grid.box)) ** (1 / 3)
+        slower = 2.837297 * force / (6 * np.pi * self.case.fluid.viscosity * side)
+        return f'with its images this slows the rods by about {slower:.3g}; fluid.box = "free" has neither'
+
     @property
     def flow_from_forces(self) -> bool:  # type: ignore[override]
         """Where no torque is on the grid: a run file has the forces alone."""
         return not self.case.couples_torque
 
-    def solve_for_flow(self) -> StokesSolve:
+    def solve_for_flow(self) -> FlowOfForces:
         """One whole FFT there and back, planned in a hurry."""
-        from ...fluids.stokes import StokesSolve
-        from ...grid.fft import ESTIMATED
+        from ...fluids.spaces.flow_of_forces import ByFFT
 
-        return StokesSolve(self.grid, self.case.fluid.viscosity, self.case.compute.threads, ESTIMATED)
+        return ByFFT(self.space, self.kernel, self.case.fluid.viscosity, self.case.compute.threads)

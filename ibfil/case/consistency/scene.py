@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from fractions import Fraction
 from itertools import pairwise
 
 from ..expressions import ExpressionError, suggestion
@@ -17,9 +16,9 @@ from ..fluid import Coefficients, Fluid, Matched
 from ..schema import Observe, Scene
 from .filament import check_filament
 from .size import check_size
+from .space import check_space
 from .thickness import check_thickness
 
-SUPPORT = {"roma3": 3, "peskin4": 4, "bspline4": 4, "bspline6": 6, "bkp6": 6, "es4": 4, "es5": 5, "es6": 6}
 LONGEST = 500  # segments of the straight rod that drag is matched to: more would be a long wait
 # Three numbers where `along` is absent.
 VECTORS = ("position", "velocity", "displacement", "drift", "force", "torque")
@@ -34,7 +33,7 @@ def check(case: Scene) -> Iterator[Fault]:
         _one_force,
         _contact,
         _fluid,
-        _grid,
+        check_space,
         _drag,
         _matched,
         check_thickness,
@@ -95,8 +94,8 @@ def _jump(fluid: Fluid) -> float:
     for component in fluid.flow or ():
         values, jumps = [], []
         for point in ((0.1, 0.2, 0.3), (-0.23, 0.41, -0.07), (0.31, -0.17, 0.44)):
-            place = {axis: p * size for axis, p, size in zip("xyz", point, fluid.box or (), strict=False)}
-            for axis, size in zip("xyz", fluid.box or (), strict=False):
+            place = {axis: p * size for axis, p, size in zip("xyz", point, fluid.sides or (), strict=False)}
+            for axis, size in zip("xyz", fluid.sides or (), strict=False):
                 for t in (0.0, 0.37):
                     try:
                         here = component.at(**place, t=t)
@@ -108,43 +107,6 @@ def _jump(fluid: Fluid) -> float:
         if jumps and max(jumps) > 1e-6 * max(values):
             return max(jumps)
     return 0.0
-
-
-def _grid(case: Scene) -> Iterator[Fault]:
-    """The box and its cells: needed by grids, and by drag matched to one; what is written must fit."""
-    fluid = case.fluid
-    needed = fluid.model != "rft" or isinstance(fluid.drag, Matched)
-    reads = ("fluid.model", "fluid.drag")
-    if needed and fluid.box is None:
-        why = "this fluid has a grid" if fluid.model != "rft" else "drag is matched to a grid"
-        yield Fault("fluid.box", "nothing", f"three lengths: {why}", reads)
-    if needed and fluid.cells is None and fluid.thickness is None:
-        yield Fault("fluid.cells", "nothing, and no thickness", "cells or thickness", (*reads, "fluid.thickness"))
-    if fluid.cells is not None and fluid.thickness is not None:
-        yield Fault("fluid.thickness", "thickness and cells", "one of them", ("fluid.cells",))
-    if fluid.box is None or fluid.cells is None:
-        return
-    spacing = [size / count for size, count in zip(fluid.box, fluid.cells, strict=True)]
-    if max(spacing) - min(spacing) > 1e-9 * max(spacing):
-        found = f"{shown(fluid.cells)}, which makes h = " + ", ".join(f"{h:.6g}" for h in spacing)
-        such = _nearest(fluid.box, fluid.cells)
-        yield Fault("fluid.cells", found, f"one h on all axes, such as {such}", ("fluid.box",))
-    elif min(fluid.cells) < SUPPORT[fluid.kernel]:
-        allowed = f"at least {SUPPORT[fluid.kernel]} on each axis, the width of {fluid.kernel}"
-        yield Fault("fluid.cells", shown(fluid.cells), allowed, ("fluid.kernel",))
-
-
-def _nearest(box: tuple[float, float, float], cells: tuple[int, int, int]) -> str:
-    """The cells nearest to the given ones that have one h in the box; where none have, a box that does."""
-    ratios = [Fraction(size / box[0]).limit_denominator(1000) for size in box]
-    if all(abs(float(r) * box[0] / size - 1.0) < 1e-9 for r, size in zip(ratios, box, strict=True)):
-        whole = math.lcm(*(ratio.denominator for ratio in ratios))
-        parts = [int(ratio * whole) for ratio in ratios]
-        parts = [part // math.gcd(*parts) for part in parts]
-        times = sum(c * p for c, p in zip(cells, parts, strict=True)) / sum(p * p for p in parts)
-        return f"cells = {shown([part * max(1, round(times)) for part in parts])}"
-    h = box[0] / cells[0]
-    return f"box = {shown([float(f'{h * count:.9g}') for count in cells])} with these cells"
 
 
 def _drag(case: Scene) -> Iterator[Fault]:
@@ -173,8 +135,8 @@ def _matched(case: Scene) -> Iterator[Fault]:
     if fluid.model != "rft" or not isinstance(fluid.drag, Matched):
         return
     key, length, found = "fluid.drag.matched", fluid.drag.matched, f"{fluid.drag.matched:g}"
-    if fluid.box is not None and length >= min(fluid.box):
-        allowed = f"below the smallest side of fluid.box, {min(fluid.box):g}"
+    if fluid.sides is not None and length >= min(fluid.sides):
+        allowed = f"below the smallest side of fluid.box, {min(fluid.sides):g}"
         yield Fault(key, found, allowed, ("fluid.box", "fluid.model"))
     for name, filament in case.filaments.items():
         ds = filament.length / (filament.nodes - 1)
@@ -231,7 +193,7 @@ def _output(case: Scene) -> Iterator[Fault]:
     elif times and times[-1] > case.time.end:
         yield Fault("output.times", f"{times[-1]:g}", f"at most time.end = {case.time.end:g}", ("time.end",))
     if case.fluid.model != "rft" and output.grid_every is None:
-        for key in ("fields", "grid_stride"):
+        for key in ("fields", "grid_stride", "window", "window_at"):
             if key in output.model_fields_set:
                 yield Fault(
                     f"output.{key}",

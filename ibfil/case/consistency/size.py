@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 
@@ -24,6 +25,7 @@ def check_size(case: Scene) -> Iterator[Fault]:
     memory = _memory()
     yield from _nodes(case, memory)
     yield from _cells(case, memory)
+    yield from _window(case, memory)
     for name in ("every", "grid_every"):
         every = getattr(case.output, name)
         if every is not None and case.time.end / every > MOST_OUTPUTS:
@@ -56,7 +58,7 @@ def _nodes(case: Scene, memory: float) -> Iterator[Fault]:
 
 def _cells(case: Scene, memory: float) -> Iterator[Fault]:
     fluid = case.fluid
-    if fluid.box is None or (fluid.model == "rft" and not isinstance(fluid.drag, Matched)):
+    if fluid.sides is None or (fluid.model == "rft" and not isinstance(fluid.drag, Matched)):
         return
     count, key, value = 1.0, "cells", ""
     if fluid.cells is not None:
@@ -65,11 +67,23 @@ def _cells(case: Scene, memory: float) -> Iterator[Fault]:
             count *= n
     elif fluid.thickness is not None:
         key, value = "thickness", f"{fluid.thickness:g}"
-        for side in fluid.box:
+        for side in fluid.sides:
             count *= side / (THINNEST * fluid.thickness)
     if count * BYTES_A_CELL > memory:
         found = f"{value}, for {count:.3g} cells and {_size(count * BYTES_A_CELL)} at least"
         yield Fault(f"fluid.{key}", found, f"what fits into this machine's {_size(memory)}", ("fluid.box",))
+
+
+def _window(case: Scene, memory: float) -> Iterator[Fault]:
+    fluid, window = case.fluid, case.output.window
+    h = fluid.spacing or (fluid.thickness or 0.0) / THINNEST
+    if window is None or not fluid.free or not h:
+        return
+    count = math.prod(side / h for side in window)
+    if count * BYTES_A_CELL > memory:
+        found = f"{shown(window)}, for {count:.3g} points and {_size(count * BYTES_A_CELL)} at least"
+        reads = ("fluid.spacing", "fluid.thickness", "fluid.box")
+        yield Fault("output.window", found, f"what fits into this machine's {_size(memory)}", reads)
 
 
 def _size(count: float) -> str:

@@ -11,6 +11,8 @@ from ...grid.spreading import Stencil
 from ..coupling import Coupling, Nodes
 from ..mobility_table import Octant
 
+_MOST = 2**23  # numbers of a block between places and nodes that is made at once
+
 
 class Mobility(Protocol):
     """The exact mobility J L^-1 S of nodes in a space; c numbers of a node go through the fluid."""
@@ -40,6 +42,24 @@ class Space(Protocol):
 
         ``number`` is the type of its tables' numbers.
         """
+
+
+def velocity_of(mobility: Mobility, coupling: Coupling, places: Stencil, nodes: Nodes, force: np.ndarray) -> np.ndarray:
+    """The velocity (k, 3) at ``places``, as a node there would feel it, of nodes that push with forces (n, c)."""
+    c, n, k = coupling.components, len(nodes.axes), len(places.base)
+    out, columns = np.empty((k, 3)), np.arange(n)
+    at_once = max(1, _MOST // (n * c * c))
+    for start in range(0, k, at_once):
+        here = slice(start, min(start + at_once, k))
+        count = here.stop - start
+        base, weights = (
+            np.concatenate([nodes.base, places.base[here]]),
+            np.concatenate([nodes.weights, places.weights[here]]),
+        )
+        both = Nodes(base, weights, np.concatenate([nodes.axes, np.zeros((count, 3))]))
+        block = mobility.block(both, np.zeros((n + count, c)), np.arange(n, n + count), columns)
+        out[here] = (block @ force.ravel()).reshape(count, c)[:, :3]
+    return out
 
 
 class TableMobility:

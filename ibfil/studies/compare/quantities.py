@@ -145,7 +145,7 @@ def _powers(run: RunFile, window: Window) -> dict[str, Quantity]:
         if run.case.fluid.inertial:
             moving = _means(run.time, read("grid_power") - read("dissipation"), window)
             out["of that into the fluid's motion"] = quantity(moving, unit)
-        else:
+        elif run.case.fluid.sides is not None:  # in free space they are one number
             inside = (run.time >= window.start * (1 - 1e-9)) & (read("grid_power") != 0)
             ratio = read("dissipation")[inside] / read("grid_power")[inside] - 1
             if len(ratio):
