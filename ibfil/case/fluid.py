@@ -116,7 +116,7 @@ class Fluid(Table):
 
     @property
     def words(self) -> str:
-        """What it is called where a run is told of."""
+        """Its name where a run is told of."""
         return f"{self.model} in free space" if self.on_grid and self.free else self.model
 
     @property

@@ -11,7 +11,7 @@ from helpers.scenes import STOKES, swimmer
 from scipy.optimize import brentq
 from scipy.special import gamma
 
-from ibfil.case.consistency.scene import SUPPORT
+from ibfil.case.consistency.space import SUPPORT
 from ibfil.check.report import report
 from ibfil.fluids import mobility_table
 from ibfil.grid.kernels import KERNELS, Kernel
