@@ -32,10 +32,8 @@ def test_as_many_steps_are_foretold_as_are_taken(keys):
     few = 4 if case.output.times else 0  # by which steps grow after short ones, between outputs that are close
     assert fewest <= taken <= most + few
     assert (fewest == most) == (not case.time.automatic)
-    assert (
-        f"about {most} steps" in report(case)
-        or (case.time.automatic
-        and f"about {fewest} to {most} steps" in report(case))
+    assert f"about {most} steps" in report(case) or (
+        case.time.automatic and f"about {fewest} to {most} steps" in report(case)
     )
 
 
