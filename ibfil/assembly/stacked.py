@@ -34,6 +34,11 @@ class RodStack:
         """Which nodes are of filaments that twist (n,): e1 of others may come to differ from node to node."""
         return np.repeat([f.twisting is not None for f in self.filaments], [w.stop - w.start for w in self.nodes])
 
+    @property
+    def groups(self) -> tuple[tuple[slice, ...], ...]:
+        """The node ranges of filaments that a preconditioner takes together."""
+        return tuple((where,) for where in self.nodes)
+
     def locate(self, node: int) -> tuple[str, int]:
         """The filament that a node of the stack is of, and its number there."""
         k = next(k for k, where in enumerate(self.nodes) if node < where.stop)

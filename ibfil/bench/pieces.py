@@ -30,7 +30,7 @@ def rft_step(nodes: int = 128) -> Row:
     rods, state, scheme = simulation.system, simulation.state_now, semi_implicit.SemiImplicit()
     fluid = simulation.fluid
     force, inner = rods.forces(state.configuration, state.time)
-    matrix = rods.definite_stiffness(state.configuration, state.configuration, inner, state.time)
+    matrix = rods.definite_stiffness(state.configuration, state.configuration, inner, state.time).band
     _system(matrix, fluid.drag, state.configuration.e3, np.zeros_like(force), force, 100.0)  # type: ignore[attr-defined]
     width, diagonals = banded.lapack_form(matrix)
     room = np.zeros((3 * width + 1, diagonals.shape[1]), order="F")

@@ -20,6 +20,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Stiffness
 
 Flow = Callable[[np.ndarray, float], np.ndarray]  # places (k, 3) and a time -> background velocity (k, 3)
 
@@ -42,7 +43,7 @@ class Solution(NamedTuple):
 class Response(Protocol):
     """A fluid at frozen positions, over a step whose effective length is tau (units of time).
 
-    ``keeps``: ``implicit`` does not overwrite the stiffness, and given the same array again, the same unknowns being
+    ``keeps``: ``implicit`` does not overwrite the stiffness, and given the same one again, the same unknowns being
     held, uses its factors again.
     """
 
@@ -52,9 +53,9 @@ class Response(Protocol):
         """The displacements y = target + tau (u0 + M (force + R)); no stiffness."""
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
-        """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K a band matrix by node."""
+        """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K = ``stiffness``."""
 
 
 class Fluid(Protocol):

@@ -12,55 +12,113 @@ which leaves the stiffness K_rr + K_rp (Zr/tau - K_pp)^-1 K_pr on displacements,
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import solve_banded
+from scipy.sparse import coo_array, csc_array, dia_array
+from scipy.sparse.linalg import splu
 
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Pairs, Stiffness, no_pairs, nodes_of
+
+Solve = Callable[[np.ndarray], np.ndarray]  # right sides (k,) or (k, l) -> the solution
+Group = tuple[slice, ...]  # node ranges of filaments that are solved for together
 
 
 class Newton(NamedTuple):
-    """One linearised statement (base.py): forces (n, m), their stiffness by bands, what is held, y, target, tau.
+    """One linearised statement (base.py): forces (n, m), their stiffness, what is held, y, target, tau.
 
     Where a background flow carries the nodes ``target`` is target + tau u0.
     """
 
     force: np.ndarray
-    stiffness: np.ndarray
+    stiffness: Stiffness
     held: Prescribed
     y: np.ndarray
     target: np.ndarray
     tau: float
 
 
+class Turns(NamedTuple):
+    """The turns of k nodes that are eliminated."""
+
+    drag: np.ndarray  # (k,) Zr/tau
+    still: np.ndarray  # (k,) zero where a turn is held
+
+    def solver(self, stiffness: Stiffness) -> Solve:
+        """The solver of Zr/tau - K_pp, with unit rows where a turn is held.
+
+        It is tridiagonal; the turns of a closed rod's first and last node are coupled as well, which SuperLU takes.
+        """
+        band, m = stiffness.band, 4
+        middle = (band.shape[2] // m - 1) // 2 * m
+        diagonals = np.zeros((3, len(band)))
+        diagonals[0, 1:] = -band[:-1, 3, middle + m + 3] * self.still[:-1]
+        diagonals[1] = np.where(self.still > 0.0, self.drag - band[:, 3, middle + 3], 1.0)
+        diagonals[2, :-1] = -band[1:, 3, middle - m + 3] * self.still[1:]
+        rows, columns, blocks = stiffness.pairs
+        if not blocks[:, 3, 3].any():
+            return lambda right: solve_banded((1, 1), diagonals, right, check_finite=False)
+        n = len(band)
+        tridiagonal = dia_array((diagonals, [1, 0, -1]), shape=(n, n))
+        corners = coo_array((-blocks[:, 3, 3] * self.still[rows], (rows, columns)), shape=(n, n))
+        return splu(csc_array(tridiagonal + corners)).solve
+
+    def coupled(self, stiffness: Stiffness) -> np.ndarray:
+        """K_pr (k, 3 k) of turns that are not held."""
+        k = len(self.drag)
+        couple = banded.dense(stiffness.band)[:, 3, :, :3]
+        for i, j, block in zip(*stiffness.pairs, strict=True):
+            couple[i, j] += block[3, :3]
+        return self.still[:, None] * couple.reshape(k, 3 * k)
+
+    def of(self, nodes: np.ndarray) -> Turns:
+        """Those of some nodes."""
+        return Turns(self.drag[nodes], self.still[nodes])
+
+
 class RodStiffness(NamedTuple):
     """The stiffness of the unknowns that go through the fluid, and which of them are held."""
 
-    band: np.ndarray  # (n, m, ..) by node
+    stiffness: Stiffness
     held: np.ndarray  # (k,) those of them that are held, flat
-    turns: np.ndarray | None  # (3, n) Zr/tau - K_pp by diagonals, unit rows where a turn is held; None: none apart
-    still: np.ndarray | None  # (n,) zero where a turn is held
+    turns: Turns | None  # None: none apart
 
-    def system(self, rod: slice, mobility: np.ndarray, tau: float) -> np.ndarray:
-        """The transpose of 1 - tau M K (c k, c k) for one filament's k nodes, or for all, with M (c k, c k) symmetric.
+    def system(self, rods: Group, mobility: np.ndarray, tau: float) -> np.ndarray:
+        """The transpose of 1 - tau M K (c k, c k) for the k nodes of some filaments, with M (c k, c k) symmetric.
 
         Columns of held unknowns are those of -tau M in it: there forces are sought. c unknowns a node go through the
         fluid.
         """
-        size, k = len(mobility), rod.stop - rod.start
-        out = banded.transposed_product(self.band[rod], mobility, -tau)
-        if self.turns is not None and self.still is not None:
-            couple = self.still[rod][:, None] * banded.dense(self.band[rod])[:, 3, :, :3].reshape(k, size)
-            turned = solve_banded((1, 1), self.turns[:, rod], couple, check_finite=False)
+        own, nodes, size = self.stiffness.of(rods), nodes_of(rods), len(mobility)
+        out = own.transposed_product(mobility, -tau)
+        if self.turns is not None:
+            turns = self.turns.of(nodes)
+            turned = turns.solver(own)(turns.coupled(own))
             out = out[:, :3].reshape(size, size) + turned.T @ out[:, 3]
         out = out.reshape(size, size)
         out.ravel()[:: size + 1] += 1.0
-        c = size // k
-        held = self.held[(self.held >= c * rod.start) & (self.held < c * rod.stop)] - c * rod.start
+        c = size // len(nodes)
+        held = np.nonzero(np.isin((c * nodes[:, None] + np.arange(c)).ravel(), self.held))[0]
         out[held] = -tau * mobility[held]
         return out
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Its parts, by name."""
+        pairs = self.stiffness.pairs._asdict() if self.stiffness.coupled else {}
+        return {"band": self.stiffness.band, "held": self.held, **pairs, **(self.turns._asdict() if self.turns else {})}
+
+    @classmethod
+    def recalled(cls, arrays: Mapping[str, np.ndarray]) -> RodStiffness:
+        """That of which ``memory`` gave the parts."""
+        pairs, band = no_pairs(arrays["band"].shape[1]), arrays["band"]
+        if "rows" in arrays:
+            pairs = Pairs(arrays["rows"].astype(np.int64), arrays["columns"].astype(np.int64), arrays["blocks"])
+        turns = Turns(arrays["drag"], arrays["still"]) if "drag" in arrays else None
+        return cls(Stiffness(band, pairs), arrays["held"].astype(np.int64), turns)
 
 
 class Reduced(Protocol):
@@ -114,10 +172,10 @@ class _Whole:
         self.force = newton.force.ravel()
 
     def times(self, d: np.ndarray) -> np.ndarray:
-        return banded.multiply(self._stiffness, d.reshape(self._shape)).ravel()
+        return self._stiffness.times(d.reshape(self._shape)).ravel()
 
     def frozen(self) -> RodStiffness:
-        return RodStiffness(self._stiffness, self.index, None, None)
+        return RodStiffness(self._stiffness, self.index, None)
 
     def whole(self, d: np.ndarray) -> np.ndarray:
         return d.reshape(self._shape)
@@ -157,50 +215,35 @@ class _Condensed:
         self.index, self.value = (3 * node + part)[~turn], moves[~turn]
         self.free = np.ones(3 * n)
         self.free[self.index] = 0.0
-        self._turns = self._tridiagonal(drag / tau)
-        self._still = np.ones(n)
-        self._still[node[turn]] = 0.0
-        self._turns[1][node[turn]] = 1.0
-        self._turns[0][1:] *= self._still[:-1]
-        self._turns[2][:-1] *= self._still[1:]
-        right = self._still * (drag / tau * (newton.target[:, 3] - y[:, 3]) + force[:, 3])
+        still = np.ones(n)
+        still[node[turn]] = 0.0
+        self._turns = Turns(drag / tau, still)
+        self._solve_turns = self._turns.solver(newton.stiffness)
+        right = still * (drag / tau * (newton.target[:, 3] - y[:, 3]) + force[:, 3])
         right[node[turn]] = moves[turn]
         self._rest = self._solve_turns(right)
         self.force = np.ascontiguousarray(force[:, :3]).ravel() + self._pushed(self._rest)
-
-    def _tridiagonal(self, drag: np.ndarray) -> np.ndarray:
-        """Zr/tau - K_pp by its three diagonals, as solve_banded takes them."""
-        n, m = self._shape
-        middle = (self._stiffness.shape[2] // m - 1) // 2 * m
-        diagonals = np.zeros((3, n))
-        diagonals[0, 1:] = -self._stiffness[:-1, 3, middle + m + 3]
-        diagonals[1] = drag - self._stiffness[:, 3, middle + 3]
-        diagonals[2, :-1] = -self._stiffness[1:, 3, middle - m + 3]
-        return diagonals
-
-    def _solve_turns(self, right: np.ndarray) -> np.ndarray:
-        return solve_banded((1, 1), self._turns, right, check_finite=False)
 
     def _pushed(self, turns: np.ndarray) -> np.ndarray:
         """K_rp turns (3 n,)."""
         x = np.zeros(self._shape)
         x[:, 3] = turns
-        return np.ascontiguousarray(banded.multiply(self._stiffness, x)[:, :3]).ravel()
+        return np.ascontiguousarray(self._stiffness.times(x)[:, :3]).ravel()
 
     def times(self, d: np.ndarray) -> np.ndarray:
         x = np.zeros(self._shape)
         x[:, :3] = d.reshape(-1, 3)
-        y = banded.multiply(self._stiffness, x)
-        return np.ascontiguousarray(y[:, :3]).ravel() + self._pushed(self._solve_turns(self._still * y[:, 3]))
+        y = self._stiffness.times(x)
+        return np.ascontiguousarray(y[:, :3]).ravel() + self._pushed(self._solve_turns(self._turns.still * y[:, 3]))
 
     def frozen(self) -> RodStiffness:
-        return RodStiffness(self._stiffness, self.index, self._turns, self._still)
+        return RodStiffness(self._stiffness, self.index, self._turns)
 
     def whole(self, d: np.ndarray) -> np.ndarray:
         out = np.zeros(self._shape)
         out[:, :3] = d.reshape(-1, 3)
-        couple = banded.multiply(self._stiffness, out)[:, 3]
-        out[:, 3] = self._solve_turns(self._still * couple) + self._rest
+        couple = self._stiffness.times(out)[:, 3]
+        out[:, 3] = self._solve_turns(self._turns.still * couple) + self._rest
         return out
 
 

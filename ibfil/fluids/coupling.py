@@ -64,7 +64,7 @@ class Nodes:
         """Where they are, without what they spin about."""
         return Stencil(self.base, self.weights)
 
-    def __getitem__(self, part: slice) -> Nodes:
+    def __getitem__(self, part: slice | np.ndarray) -> Nodes:
         """Some of them."""
         return Nodes(self.base[part], self.weights[part], self.axes[part])
 

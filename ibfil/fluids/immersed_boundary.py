@@ -19,10 +19,10 @@ import numpy as np
 
 from ..grid.kernels import Kernel
 from ..grid.spreading import Stencil
-from ..linalg import banded
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Stiffness
 from .base import Flow, Solution
-from .condensation import Condensation, Newton, NothingCondensed, Reduced, TwistCondensed
+from .condensation import Condensation, Group, Newton, NothingCondensed, Reduced, TwistCondensed
 from .coupling import TRANSLATION, Coupling, Nodes
 from .spaces.base import Mobility, Space
 from .velocity_gradient import advected
@@ -33,10 +33,10 @@ class Immersed:
     """The ingredients of an immersed-boundary fluid: space, kernel, eta, slip (n,), drag against spin (n,), flow.
 
     The drag against spin is None where nothing twists, or where twist torques go through the grid. ``twists`` (n,) is
-    one where a background flow turns nodes against that drag, zero at those of rods that do not twist. ``filaments``
-    are the node ranges of the filaments: a node feels the stiffness of its own filament only. ``number`` is the type of
-    the mobility table's numbers and of the fields of a fluid with inertia, double or single precision (relative error
-    about 1e-7).
+    one where a background flow turns nodes against that drag, zero at those of rods that do not twist. ``groups`` are
+    the node ranges of filaments, linked ones together: a node feels little of others. ``number`` is the type of the
+    mobility table's numbers and of the fields of a fluid with inertia, double or single precision (relative error about
+    1e-7).
     """
 
     space: Space
@@ -46,7 +46,7 @@ class Immersed:
     spin_drag: np.ndarray | None
     flow: Flow | None = None
     twists: np.ndarray | None = None
-    filaments: tuple[slice, ...] = ()
+    groups: tuple[Group, ...] = ()
     number: type = np.float64
     coupling: Coupling = TRANSLATION
 
@@ -142,7 +142,7 @@ class ImmersedResponse(ABC):
         return Solution(y, force + reaction, reaction)
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
         condensation, c, base = self.immersed.condensation, self.components, self._carried(target)
@@ -157,6 +157,6 @@ class ImmersedResponse(ABC):
         d[index] = statement.value
         reaction[index // c, index % c] = x[index]
         move = statement.whole(d)
-        felt = force + banded.multiply(stiffness, move)
+        felt = force + stiffness.times(move)
         reaction += condensation.react_rest(y + move, base, felt, held, self.tau)
         return Solution(move, felt + reaction, reaction)

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..linalg import gmres
 from ..linalg.gmres import CYCLE, Blocks, GmresResult, Product
-from .condensation import Reduced, RodStiffness
+from ..linalg.stiffness import Stiffness, nodes_of
+from .condensation import Group, Reduced, RodStiffness
 from .coupling import Nodes
 
 _EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself
@@ -111,12 +112,13 @@ class Matrix(NamedTuple):
     own: np.ndarray
     parts: int
 
-    def factored(self, nodes: Nodes, tau: float, rods: RodStiffness, ranges: tuple[slice, ...]) -> Blocks:
-        """The factors of the systems of ranges of nodes, each by itself."""
+    def factored(self, nodes: Nodes, tau: float, rods: RodStiffness, groups: tuple[Group, ...]) -> Blocks:
+        """The factors of the systems of groups of filaments, each by itself."""
         parts, c = [], self.parts
-        for rod in ranges:
-            matrix = self.of(nodes[rod], self.own[rod])
-            parts.append((slice(c * rod.start, c * rod.stop), rods.system(rod, matrix, tau)))
+        for group in groups:
+            at = nodes_of(group)
+            matrix = self.of(nodes[at], self.own[at])
+            parts.append(((c * at[:, None] + np.arange(c)).ravel(), rods.system(group, matrix, tau)))
         return gmres.factored(parts, rods.held)
 
 
@@ -136,14 +138,14 @@ class WholeMatrix:
 
     def __init__(self, matrix: Matrix) -> None:
         self._matrix = matrix
-        self._known: tuple[np.ndarray, Blocks] | None = None  # the stiffness, and the factors
+        self._known: tuple[Stiffness, Blocks] | None = None  # the stiffness, and the factors
 
     def solve(self, asked: Asked, right: np.ndarray) -> np.ndarray:
         """By an iteration or two."""
         rods = asked.statement.frozen()
-        if self._known is None or self._known[0] is not rods.band:
-            whole = (slice(0, len(asked.nodes.axes)),)
-            self._known = rods.band, self._matrix.factored(asked.nodes, asked.tau, rods, whole)
+        if self._known is None or self._known[0] is not rods.stiffness:
+            whole = ((slice(0, len(asked.nodes.axes)),),)
+            self._known = rods.stiffness, self._matrix.factored(asked.nodes, asked.tau, rods, whole)
         return _checked(gmres.solve(asked.product, right, self._known[1], _EXACT, _MOST))
 
 
@@ -156,13 +158,13 @@ class _Source(NamedTuple):
 
 
 class RodByRod:
-    """The exact matrix of each filament (node ranges ``rods``) by itself, of the steps of a run one after the other."""
+    """The exact matrix of each group of filaments by itself, of the steps of a run one after the other."""
 
     keeps = False
 
-    def __init__(self, matrix: Matrix, rods: tuple[slice, ...], cost: float, couples_torque: bool) -> None:
+    def __init__(self, matrix: Matrix, groups: tuple[Group, ...], cost: float, couples_torque: bool) -> None:
         """``cost``: what making the factors costs, in products; ``couples_torque``: torques are among the unknowns."""
-        self._matrix, self._rods = matrix, rods
+        self._matrix, self._groups = matrix, groups
         self.kept = KeptFactors(cost)
         self._tolerance = _WITH_TORQUES * _LOOSE if couples_torque else _LOOSE
         self._source: _Source | None = None
@@ -190,19 +192,18 @@ class RodByRod:
     def _make(self, source: _Source) -> None:
         self._source = source
         self.kept.blocks = None  # two of them at a time would be the most of a run's memory
-        self.kept.renew(self._matrix.factored(source.nodes, source.tau, source.rods, self._rods), source.tau)
+        self.kept.renew(self._matrix.factored(source.nodes, source.tau, source.rods, self._groups), source.tau)
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """The source of the factors; empty before there are any."""
         if self._source is None:
             return {}
-        rods = {name: value for name, value in self._source.rods._asdict().items() if value is not None}
-        return {**rods, **vars(self._source.nodes), **self.kept.memory()}
+        return {**self._source.rods.memory(), **vars(self._source.nodes), **self.kept.memory()}
 
     def recall(self, memory: dict[str, np.ndarray | float]) -> None:
         """Makes the factors of ``memory`` again."""
         arrays = {k: np.asarray(v) for k, v in memory.items()}
-        rods = RodStiffness(arrays["band"], arrays["held"].astype(np.int64), arrays.get("turns"), arrays.get("still"))
+        rods = RodStiffness.recalled(arrays)
         nodes = Nodes(arrays["base"].astype(np.int64), arrays["weights"], arrays["axes"])
         self._make(_Source(nodes, float(arrays["tau"]), rods))
         self.kept.recall({k: float(v) for k, v in memory.items() if not isinstance(v, np.ndarray)})

@@ -2,22 +2,28 @@
 
     Z_i = Lc [ zeta_perp (1 - e3 e3) + zeta_par e3 e3 ],   and Lc zeta_r for the spin:   Z (u - u0) = F
 
-u0 is the background flow, and half its curl about the tangent. M = Z^-1, so the implicit step is multiplied by Z and
-stays banded: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f.
+u0 is the background flow, and half its curl about the tangent. M = Z^-1, so the implicit step is multiplied by Z and is
+as sparse as K: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f. A band where rods are alone; where nodes far apart are
+coupled, factors in an order of little fill (block_sparse.py).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Pairs, Stiffness
 from ..linalg.vectors import at, dot, mix, put
 from .base import Flow, Memoryless, Solution
 from .velocity_gradient import advected
+
+if TYPE_CHECKING:
+    from ..linalg.block_sparse import BlockSparse
 
 
 class Drag(NamedTuple):
@@ -82,19 +88,25 @@ def _system(stiffness, drag: Drag, e3, moved, force, inverse):
 
 
 @njit(cache=True)
+def _hold(stiffness, right, held, value):
+    """Puts the rows d = value (k,) of the held unknowns (k,) into the system and its right side."""
+    m, width = stiffness.shape[1:]
+    for k in range(held.size):
+        i, a = held[k] // m, held[k] % m
+        stiffness[i, a, :] = 0.0
+        stiffness[i, a, (width - m) // 2 + a] = 1.0
+        right[i, a] = value[k]
+
+
+@njit(cache=True)
 def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, profile, unit):
     """Solves (K - Z/tau) d = Z moved/tau - f with d = value (k,) at the held unknowns (k,).
 
     Returns d, the force felt Z (moved + d)/tau, and whether elimination without pivoting went well; if not, d is of no
     use. ``stiffness`` is used up, ``unit`` a tuple of m entries.
     """
-    m, width = stiffness.shape[1:]
     d = _system(stiffness, drag, e3, moved, force, inverse)
-    for k in range(held.size):
-        i, a = held[k] // m, held[k] % m
-        stiffness[i, a, :] = 0.0
-        stiffness[i, a, (width - m) // 2 + a] = 1.0
-        d[i, a] = value[k]
+    _hold(stiffness, d, held, value)
     good = banded.eliminate(stiffness, d, profile.first, profile.last, unit)
     return d, resist(drag, e3, (moved + d) * inverse), good
 
@@ -102,10 +114,8 @@ def _correct(stiffness, drag: Drag, e3, moved, force, inverse, held, value, prof
 class _Response:
     keeps = False
 
-    def __init__(
-        self, drag: Drag, profile: banded.Profile, e3: np.ndarray, flow: np.ndarray | None, tau: float
-    ) -> None:
-        self.drag, self.profile, self.e3, self.flow, self.tau = drag, profile, e3, flow, tau
+    def __init__(self, fluid: ResistiveForce, e3: np.ndarray, flow: np.ndarray | None, tau: float) -> None:
+        self.drag, self._fluid, self.e3, self.flow, self.tau = fluid.drag, fluid, e3, flow, tau
 
     def _carried(self, target: np.ndarray) -> np.ndarray:
         """The displacements (n, m) without any force: target + tau u0."""
@@ -119,27 +129,48 @@ class _Response:
         return Solution(y, felt, _at(held, felt - force))
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         """(K - Z/tau) d = Z/tau (y - target) - Z u0 - f; uses ``stiffness`` up."""
         base = self._carried(target)
-        moved, m, inverse = y - base, force.shape[1], 1.0 / self.tau
-        nodes = np.unique(held.at // m) if held.at.size else held.at
-        rows = stiffness[nodes] if nodes.size else stiffness[:0]
-        value = held.value - y.ravel()[held.at] if nodes.size else held.value
-        d, felt, good = _correct(
-            *(stiffness, self.drag, self.e3, moved, force, inverse, held.at, value, self.profile, (0,) * m)
-        )
-        if not good:
-            right = inverse * resist(self.drag, self.e3, moved) - force
-            right.ravel()[held.at] = value
-            d = banded.solve_pivoted(stiffness, right)
-            felt = resist(self.drag, self.e3, (moved + d) * inverse)
-        if not nodes.size:
+        moved, m = y - base, force.shape[1]
+        solve = self._coupled if stiffness.coupled else self._banded
+        if not held.at.size:
+            d, felt = solve(stiffness, moved, force, held.at, held.value)
             return Solution(d, felt, np.zeros(d.shape))
+        rows = _Rows.of(stiffness, np.unique(held.at // m))
+        d, felt = solve(stiffness, moved, force, held.at, held.value - y.ravel()[held.at])
         rest = felt - force
-        rest[nodes] -= _rows_times(rows, nodes, d)
+        rest[rows.nodes] -= rows.times(d)
         return Solution(d, felt, _at(held, rest))
+
+    def _banded(
+        self, stiffness: Stiffness, moved: np.ndarray, force: np.ndarray, at: np.ndarray, value: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """d and the force felt, where there is nothing but a band."""
+        band, m, inverse = stiffness.band, force.shape[1], 1.0 / self.tau
+        d, felt, good = _correct(
+            *(band, self.drag, self.e3, moved, force, inverse, at, value, self._fluid.profile, (0,) * m)
+        )
+        if good:
+            return d, felt
+        right = inverse * resist(self.drag, self.e3, moved) - force
+        right.ravel()[at] = value
+        d = banded.solve_pivoted(band, right)
+        return d, resist(self.drag, self.e3, (moved + d) * inverse)
+
+    def _coupled(
+        self, stiffness: Stiffness, moved: np.ndarray, force: np.ndarray, at: np.ndarray, value: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same where nodes beyond the band are coupled."""
+        (band, pairs), inverse = stiffness, 1.0 / self.tau
+        right = _system(band, self.drag, self.e3, moved, force, inverse)
+        _hold(band, right, at, value)
+        free = np.ones(force.shape)
+        free.ravel()[at] = 0.0
+        blocks = pairs.blocks * free[pairs.rows][:, :, None]
+        d = self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))(right)
+        return d, resist(self.drag, self.e3, (moved + d) * inverse)
 
 
 def _at(held: Prescribed, values: np.ndarray) -> np.ndarray:
@@ -149,13 +180,31 @@ def _at(held: Prescribed, values: np.ndarray) -> np.ndarray:
     return out
 
 
-def _rows_times(rows: np.ndarray, nodes: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """(K d) at a few nodes (k, m), from their rows of the band matrix."""
-    n, m = d.shape
-    w = (rows.shape[2] // m - 1) // 2
-    padded = np.zeros((n + 2 * w, m))
-    padded[w : n + w] = d
-    return np.stack([row @ padded[i : i + 2 * w + 1].ravel() for row, i in zip(rows, nodes, strict=True)])
+class _Rows(NamedTuple):
+    """The rows of a stiffness at a few ``nodes`` (k,): of the band (k, m, ..), and the coupled pairs of these nodes."""
+
+    nodes: np.ndarray
+    band: np.ndarray
+    pairs: Pairs
+
+    @classmethod
+    def of(cls, stiffness: Stiffness, nodes: np.ndarray) -> _Rows:
+        """A copy of the rows."""
+        rows, columns, blocks = stiffness.pairs
+        here = np.isin(rows, nodes) if stiffness.coupled else slice(0)
+        return cls(nodes, stiffness.band[nodes], Pairs(rows[here], columns[here], blocks[here]))
+
+    def times(self, d: np.ndarray) -> np.ndarray:
+        """(K d) at the nodes (k, m)."""
+        n, m = d.shape
+        w = (self.band.shape[2] // m - 1) // 2
+        padded = np.zeros((n + 2 * w, m))
+        padded[w : n + w] = d
+        out = np.stack([row @ padded[i : i + 2 * w + 1].ravel() for row, i in zip(self.band, self.nodes, strict=True)])
+        if self.pairs.rows.size:
+            products = (self.pairs.blocks @ d[self.pairs.columns][:, :, None])[:, :, 0]
+            np.add.at(out, np.searchsorted(self.nodes, self.pairs.rows), products)
+        return out
 
 
 class LinearStep(NamedTuple):
@@ -198,9 +247,16 @@ class ResistiveForce(Memoryless):
             return None
         return advected(self.flow, r, None if self.twists is None else self.twists[:, None] * e3, time, self.spacing)
 
+    @cached_property
+    def coupled(self) -> BlockSparse:
+        """The factorisation of systems of rods that are coupled, loaded where there are any."""
+        from ..linalg.block_sparse import BlockSparse
+
+        return BlockSparse(self.profile)
+
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _Response:
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
-        return _Response(self.drag, self.profile, e3, self.advected(r, e3, time), tau)
+        return _Response(self, e3, self.advected(r, e3, time), tau)
 
     def linear_step(self, e3: np.ndarray, stiffness: np.ndarray, held: np.ndarray, tau: float) -> LinearStep:
         """The step y -> (1 - tau M K)^-1 y of displacements (n, m), zero at the unknowns ``held`` (k,); factored.

@@ -22,6 +22,7 @@ from ..grid.periodic_grid import Grid
 from ..grid.spectral import project
 from ..grid.spreading import interpolate, spread
 from ..linalg import gmres
+from ..linalg.stiffness import Stiffness
 from .base import Memoryless
 from .condensation import Reduced
 from .coupling import Nodes
@@ -87,7 +88,7 @@ class _Dense(ImmersedResponse):
     ) -> None:
         super().__init__(immersed, nodes, flow, tau)
         self.matrix = matrix
-        self._factors: tuple[np.ndarray, gmres.Factors] | None = None  # and the stiffness they are of
+        self._factors: tuple[Stiffness, gmres.Factors] | None = None  # and the stiffness they are of
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         return self.matrix @ force
@@ -97,9 +98,9 @@ class _Dense(ImmersedResponse):
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         rods = statement.frozen()
-        if self._factors is None or self._factors[0] is not rods.band:
-            system = rods.system(slice(0, len(self.nodes.axes)), self.matrix, self.tau)
-            self._factors = rods.band, gmres.factor(system)
+        if self._factors is None or self._factors[0] is not rods.stiffness:
+            system = rods.system((slice(0, len(self.nodes.axes)),), self.matrix, self.tau)
+            self._factors = rods.stiffness, gmres.factor(system)
         return self._factors[1].solve(right)
 
 
@@ -218,7 +219,7 @@ class StokesByKrylov(StokesByFFT):
 
     def __init__(self, immersed: Immersed, solver: Solver, cost: float, alpha: float = 0.0) -> None:
         super().__init__(immersed, solver, alpha)
-        self.kept = RodByRod(self._exact(), immersed.filaments, cost, couples_torque=immersed.coupling.grid_vectors > 1)
+        self.kept = RodByRod(self._exact(), immersed.groups, cost, couples_torque=immersed.coupling.grid_vectors > 1)
 
     def _preconditioner(self) -> Preconditioner:
         self.kept.begin()

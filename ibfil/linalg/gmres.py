@@ -44,13 +44,13 @@ def factor(transposed: np.ndarray) -> Factors:
 
 
 class Blocks(NamedTuple):
-    """A preconditioner: LU factors of the system's diagonal block for each range of unknowns, and their scale.
+    """A preconditioner: LU factors of the system's diagonal block for each set of unknowns, and their scale.
 
     ``scale`` (n,) are the units that solutions are measured in: one for a move, and for the force that holds an
     unknown the force that would move it by one.
     """
 
-    factors: list[tuple[slice, Factors]]
+    factors: list[tuple[np.ndarray, Factors]]
     scale: np.ndarray
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -61,9 +61,11 @@ class Blocks(NamedTuple):
         return out
 
 
-def factored(parts: list[tuple[slice, np.ndarray]], held: np.ndarray) -> Blocks:
-    """The factors of square blocks, by the range of unknowns each stands for, given transposed; overwrites them."""
-    diagonal = np.concatenate([np.diag(system) for _, system in parts])
+def factored(parts: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> Blocks:
+    """The factors of square blocks, by the unknowns (k,) each stands for, given transposed; overwrites them."""
+    diagonal = np.empty(sum(len(at) for at, _ in parts))
+    for at, system in parts:
+        diagonal[at] = np.diag(system)
     scale = np.ones(len(diagonal))
     scale[held] = 1.0 / diagonal[held]
     return Blocks([(at, factor(system)) for at, system in parts], scale)

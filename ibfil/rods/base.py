@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -41,7 +42,7 @@ class Load(Protocol):
         """Adds the force on each node, (n, m)."""
 
     def add_stiffness(self, time: float, linearization: Linearization) -> None:
-        """Adds its derivative to the band matrix being filled."""
+        """Adds its derivative to the stiffness being filled."""
 
 
 class Ends(Protocol):
@@ -71,11 +72,11 @@ class NoContact:
         """Nothing."""
         return {}
 
-    def state(self) -> dict[str, float]:
+    def state(self) -> dict[str, float | np.ndarray]:
         """Nothing."""
         return {}
 
-    def restore(self, state: dict[str, float]) -> None:
+    def restore(self, state: Mapping[str, float | np.ndarray]) -> None:
         """Nothing."""
 
 

@@ -23,18 +23,13 @@ import numpy as np
 from numba import njit
 
 from ..errors import StepFailed, Stopped
-from .geometry import Configuration
-from .linearization import Linearization
-from .loads import ExternalLoad
 from .neighbour_search import Pairs, Segments, closest, search
+from .repulsion import Repulsion, farthest
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from .base import Load
-
-
-_PULL = 0.01  # of the points that repel to the middles of their segments
 
 
 class Touch(NamedTuple):
@@ -55,11 +50,6 @@ class Touch(NamedTuple):
         return f"contact between {where}, {near}, at t = {self.time:.6g}"
 
 
-def _farthest(before: np.ndarray, after: np.ndarray) -> float:
-    """The longest way of a node from positions ``before`` to ``after`` (n, 3)."""
-    return float(np.sqrt(np.max(np.sum((after - before) ** 2, axis=1))))
-
-
 @njit(cache=True)
 def passing(segments: Segments, after, pairs: Pairs, tiny):
     """The first of the pairs whose line from one to the other has turned by more than a right angle, or -1.
@@ -78,39 +68,6 @@ def passing(segments: Segments, after, pairs: Pairs, tiny):
     return -1
 
 
-@njit(cache=True)
-def repel(segments: Segments, r, pairs: Pairs, strength, force):
-    """Adds to force (n, 3 or 4) the repulsion of the pairs; returns its stiffness, but for what couples two segments.
-
-    Along the gap, df = -F w/D (gap gap)/d^2 dr: (n, 3, 3) of a node on itself, and of nodes i and i + 1 on each other.
-    """
-    n = force.shape[0]
-    u, v, gap = np.empty(3), np.empty(3), np.empty(3)
-    own, beside = np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
-    for k in range(pairs.i.size):
-        i, j = pairs.i[k], pairs.j[k]
-        p, q = segments.first[i], segments.first[j]
-        for c in range(3):
-            u[c], v[c] = r[p + 1, c] - r[p, c], r[q + 1, c] - r[q, c]
-        a, b, d = closest(r[p], u, r[q], pairs.shift[k], v, _PULL, gap)
-        touch = segments.radius[i] + segments.radius[j]
-        if d == 0.0 or d >= 2.0 * touch:
-            continue  # rods laid through each other have no direction to part in
-        lengths = (segments.end[i] - segments.begin[i]) * (segments.end[j] - segments.begin[j])
-        scale = strength * min(1.0, lengths / (np.pi * touch * touch))
-        for node, t, sign in ((p, a, 1.0), (q, b, -1.0)):
-            for c in range(3):
-                f = sign * scale * (2.0 - d / touch) * gap[c] / d
-                force[node, c] += (1.0 - t) * f
-                force[node + 1, c] += t * f
-                for e in range(3):
-                    s = -scale / touch * gap[c] * gap[e] / (d * d)
-                    own[node, c, e] += (1.0 - t) ** 2 * s
-                    own[node + 1, c, e] += t * t * s
-                    beside[node, c, e] += t * (1.0 - t) * s
-    return own, beside
-
-
 class Contact:
     """The search for contact in a scene; what comes of it is said by the classes below.
 
@@ -126,7 +83,7 @@ class Contact:
     ) -> None:
         self.segments, self.box = segments, box
         self._names, self._offsets = names, offsets
-        self._nearest = 2 * float(np.min(segments.radius))
+        self.nearest = 2 * float(np.min(segments.radius))
         self._clear = 0.0  # how much nearer two segments may come before there is anything to look for
         self.since = np.nan  # time of the first contact
 
@@ -141,12 +98,12 @@ class Contact:
         """
         if not np.isnan(self.since):
             return ""
-        self._clear -= 2 * _farthest(before, after)
+        self._clear -= 2 * farthest(before, after)
         if self._clear > 0:
             return ""
         touch = self.first(before, after, start, end)
         if touch is None:
-            self._clear = self.clearance(after, self._nearest)
+            self._clear = self.clearance(after, self.nearest)
             return ""
         return self._found(touch)
 
@@ -159,7 +116,7 @@ class Contact:
 
         Looked for in parts of a step in which no two rods come nearer by more than they touch at: none slips through.
         """
-        parts = max(1, int(np.ceil(2 * _farthest(before, after) / self._nearest)))
+        parts = max(1, int(np.ceil(2 * farthest(before, after) / self.nearest)))
         for part in range(1, parts + 1):
             r = after if part == parts else before + (part / parts) * (after - before)
             pairs = self.near(r)
@@ -194,13 +151,13 @@ class Contact:
         """Diagnostics of an output: pairs that touch now, at nodes r (n, 3), and the time of the first contact."""
         return {"contacts": float(self.near(r).i.size), "first_contact": self.since}
 
-    def state(self) -> dict[str, float]:
+    def state(self) -> dict[str, float | np.ndarray]:
         """The part of a run's state that it is."""
         return {"first_contact": self.since}
 
-    def restore(self, state: dict[str, float]) -> None:
+    def restore(self, state: Mapping[str, float | np.ndarray]) -> None:
         """Goes on from what ``state`` gave."""
-        self.since = state["first_contact"]
+        self.since = float(state["first_contact"])
 
 
 class ContactWarns(Contact):
@@ -222,6 +179,7 @@ class ContactRepels(Contact):
     ) -> None:
         super().__init__(segments, names, offsets, box)
         self.strength = strength
+        self._repulsion = Repulsion(segments, box, strength)
 
     def watch(self, before: np.ndarray, after: np.ndarray, start: float, end: float) -> str:
         """Nothing to tell: they are kept apart."""
@@ -231,8 +189,8 @@ class ContactRepels(Contact):
         """Raises StepFailed where a step from nodes ``before`` to ``after`` (n, 3) takes a segment through another."""
         if not np.all(np.isfinite(after)):
             return
-        pairs = self.near(before, 2.0, 2 * _farthest(before, after))
-        k = passing(self.segments, after, pairs, 1e-9 * self._nearest)
+        pairs = self.near(before, 2.0, 2 * farthest(before, after))
+        k = passing(self.segments, after, pairs, 1e-9 * self.nearest)
         if k >= 0:
             node = int(self.segments.first[pairs.i[k]])
             other = self._names[self.segments.rod[pairs.j[k]]]
@@ -240,40 +198,15 @@ class ContactRepels(Contact):
 
     def loads(self) -> list[Load]:
         """The repulsion."""
-        return [Repulsion(self)]
+        return [self._repulsion]
 
+    def state(self) -> dict[str, float | np.ndarray]:
+        """The nodes at which pairs were looked for, too."""
+        near = self._repulsion.near
+        return super().state() | ({} if near is None else {"contact_near": near})
 
-class Repulsion(ExternalLoad):
-    """The repulsion of segments.
-
-    Its stiffness couples filaments, which a band matrix cannot hold: it has the part of each segment on itself, along
-    the gap. That is half of what two rods feel on their way apart, so Newton's iteration converges, by a factor each
-    time where it would square the error. A single linear solve is stable with it at any step length by backward Euler;
-    by the trapezoid of [thermal] where dt F/D is below the drag of a node.
-    """
-
-    def __init__(self, contact: ContactRepels) -> None:
-        self.contact = contact
-        self._known: tuple[np.ndarray, Pairs] | None = None
-
-    def _act(self, r: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        contact = self.contact
-        if self._known is None or self._known[0] is not r:
-            self._known = r, contact.near(r, 2.0)
-        return repel(contact.segments, r, self._known[1], contact.strength, force)
-
-    def add_force(self, configuration: Configuration, time: float, force: np.ndarray) -> None:
-        """f = F w (2 - d/D) on the end nodes of either segment."""
-        self._act(configuration.r, force)
-
-    def add_stiffness(self, time: float, linearization: Linearization) -> None:
-        """df = -F w/D along the gap, of each segment on itself."""
-        r = linearization.configuration.r
-        own, beside = self._act(r, np.zeros((len(r), 3)))
-        for blocks, shift in ((own, 0), (beside, 1)):
-            nodes = np.nonzero(np.any(blocks, axis=(1, 2)))[0]
-            rows = np.zeros((len(nodes), linearization.m, 3))
-            rows[:, :3] = blocks[nodes]
-            linearization.position(nodes, rows, shift)
-            if shift:
-                linearization.position(nodes + 1, rows, -1)
+    def restore(self, state: Mapping[str, float | np.ndarray]) -> None:
+        """Goes on from what ``state`` gave."""
+        super().restore(state)
+        if "contact_near" in state:
+            self._repulsion.look(np.asarray(state["contact_near"]))

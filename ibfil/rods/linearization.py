@@ -1,4 +1,4 @@
-"""How forces that follow the rod change with it: from tangents, curvatures and turns into a band matrix by node.
+"""How forces that follow the rod change with it: from tangents, curvatures and turns into a stiffness by node.
 
 A load writes its derivative in the quantities it is made of; here they are traced to displacements. With the tangents
 ``old`` of the step's start (holonomy as in elastic_jacobian.py):
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..linalg.stiffness import Pairs, Stiffness, no_pairs
 from .geometry import Configuration
 from .mesh import Mesh
 
@@ -29,16 +30,29 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
+def force_rows(rows: np.ndarray, unknowns: int) -> np.ndarray:
+    """Rows (k, 3, ...) of forces, with a row of no torque where rods twist."""
+    if unknowns == 3:
+        return rows
+    return np.concatenate([rows, np.zeros_like(rows[:, :1])], axis=1)
+
+
 class Linearization:
-    """A band matrix (n, m, (2 w + 1) m) being filled, at the configuration ``configuration`` reached from ``start``.
+    """A stiffness being filled, at the configuration ``configuration`` reached from ``start``.
+
+    ``matrix`` (n, m, (2 w + 1) m) is its band; pairs of nodes that are coupled beyond it are gathered beside.
 
     In each method ``nodes`` (k,) are the nodes whose quantity varies, ``rows`` (k, m, 3) or (k, m) its factor, and the
     result goes to the rows of the nodes ``nodes + shift``; no node comes twice with the same shift. Rows of forces come
-    first, the torque (m = 4) last.
+    first, the torque (m = 4) last. ``definite``: what may make the matrix indefinite is to be left out.
     """
 
-    def __init__(self, mesh: Mesh, configuration: Configuration, start: Configuration, matrix: np.ndarray) -> None:
+    def __init__(
+        self, mesh: Mesh, configuration: Configuration, start: Configuration, matrix: np.ndarray, definite: bool = False
+    ) -> None:
         self.mesh, self.configuration, self.start, self.matrix = mesh, configuration, start, matrix
+        self.definite = definite
+        self._pairs: list[Pairs] = []
         self.m = matrix.shape[1]
         self._w = (matrix.shape[2] // self.m - 1) // 2
 
@@ -47,6 +61,22 @@ class Linearization:
         offset = (columns - rows[:, None] + self._w) * self.m
         at = offset[:, :, None, None] + np.arange(3)
         self.matrix[rows[:, None, None, None], np.arange(self.m)[:, None], at] += values
+
+    def couple(self, rows: np.ndarray, columns: np.ndarray, blocks: np.ndarray) -> None:
+        """blocks (l, 3, 3) times dr of any nodes ``columns`` (l,), to the forces on any nodes ``rows`` (l,)."""
+        own = rows == columns
+        middle = self.matrix.reshape(*self.matrix.shape[:2], -1, self.m)[:, :, self._w, :3]
+        np.add.at(middle, rows[own], force_rows(blocks[own], self.m))
+        beside, whole = ~own, np.zeros((np.count_nonzero(~own), self.m, self.m))
+        whole[:, :3, :3] = blocks[beside]
+        self._pairs.append(Pairs(rows[beside], columns[beside], whole))
+
+    @property
+    def stiffness(self) -> Stiffness:
+        """The stiffness that was filled."""
+        if not self._pairs:
+            return Stiffness(self.matrix, no_pairs(self.m))
+        return Stiffness(self.matrix, Pairs(*(np.concatenate(column) for column in zip(*self._pairs, strict=True))))
 
     def position(self, nodes: np.ndarray, rows: np.ndarray, shift: Shift = 0) -> None:
         """rows dr"""

@@ -11,17 +11,10 @@ from collections.abc import Callable
 import numpy as np
 
 from .geometry import Configuration
-from .linearization import Linearization, cross
+from .linearization import Linearization, cross, force_rows
 from .mesh import Mesh
 
 OfTime = Callable[[float], np.ndarray]
-
-
-def _forces(rows: np.ndarray, unknowns: int) -> np.ndarray:
-    """Rows (k, 3, ...) of forces, with a row of no torque where rods twist."""
-    if unknowns == 3:
-        return rows
-    return np.concatenate([rows, np.zeros_like(rows[:, :1])], axis=1)
 
 
 class ExternalLoad:
@@ -51,7 +44,7 @@ class Follower(ExternalLoad):
 
     def add_stiffness(self, time: float, linearization: Linearization) -> None:
         """df = size de3."""
-        linearization.tangent(self.node, _forces(self.size(time) * np.eye(3)[None], linearization.m))
+        linearization.tangent(self.node, force_rows(self.size(time) * np.eye(3)[None], linearization.m))
 
 
 class DeadForce(ExternalLoad):
@@ -91,7 +84,7 @@ class ForceField(ExternalLoad):
             step = np.zeros(3)
             step[c] = self._h
             rows[:, :, c] = (self.force(r + step, time) - self.force(r - step, time)) / (2 * self._h)
-        linearization.position(self.nodes, _forces(rows, linearization.m))
+        linearization.position(self.nodes, force_rows(rows, linearization.m))
 
 
 class Tether(ExternalLoad):
@@ -106,7 +99,7 @@ class Tether(ExternalLoad):
 
     def add_stiffness(self, time: float, linearization: Linearization) -> None:
         """df = -k dr."""
-        linearization.position(self.nodes, _forces(-self.stiffness[:, :, None] * np.eye(3), linearization.m))
+        linearization.position(self.nodes, force_rows(-self.stiffness[:, :, None] * np.eye(3), linearization.m))
 
 
 class BodyForce(ExternalLoad):
@@ -124,7 +117,7 @@ class BodyForce(ExternalLoad):
     def add_stiffness(self, time: float, linearization: Linearization) -> None:
         """df = b_a de_a."""
         rows = np.broadcast_to(np.eye(3), (len(self.nodes), 3, 3))
-        linearization.directors(self.nodes, self.parts(time), _forces(rows, linearization.m))
+        linearization.directors(self.nodes, self.parts(time), force_rows(rows, linearization.m))
 
 
 class ActiveMoment(ExternalLoad):
@@ -156,7 +149,7 @@ class ActiveMoment(ExternalLoad):
         # Of a node's two fluxes, one on either side: in its own row they cancel but at an end.
         for sides, shift, sign in self._into:
             nodes = np.nonzero(sides)[0]
-            rows = _forces((sign * sides)[nodes, None, None] * np.eye(3), linearization.m)
+            rows = force_rows((sign * sides)[nodes, None, None] * np.eye(3), linearization.m)
             linearization.directors(nodes, crossed[nodes], rows, shift)
 
 

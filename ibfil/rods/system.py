@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Stiffness
 from . import elastic_force, elastic_jacobian
 from . import mesh as rods_mesh
 from .base import REVERSED, Ends, Law, Load, TangentReversed
@@ -104,33 +105,33 @@ class RodSystem:
             out[half] = np.stack([force[half], force[half + 1]], axis=1)
         return out
 
-    def stiffness(self, configuration: Configuration, start: Configuration, moment: Moment, time: float) -> np.ndarray:
-        """The exact Jacobian of ``forces`` with respect to the displacements from ``start``, by bands."""
+    def stiffness(self, configuration: Configuration, start: Configuration, moment: Moment, time: float) -> Stiffness:
+        """The exact Jacobian of ``forces`` with respect to the displacements from ``start``."""
         return self._stiffness(configuration, start, moment, time, -np.inf)
 
     def definite_stiffness(
         self, configuration: Configuration, start: Configuration, moment: Moment, time: float
-    ) -> np.ndarray:
+    ) -> Stiffness:
         """The same but for compression, which is left out of the geometric stiffness: one linear solve is robust."""
         return self._stiffness(configuration, start, moment, time, 0.0)
 
     def _stiffness(
         self, configuration: Configuration, start: Configuration, moment: Moment, time: float, least: float
-    ) -> np.ndarray:
+    ) -> Stiffness:
         """The Jacobian with tensions not below ``least`` (elastic_jacobian.py)."""
         matrix = np.zeros(self._matrix_shape)
         elastic_jacobian.stiffness(
             self.mesh, self._stencils, configuration, start, moment, self.stretching, least, matrix
         )
-        self._add_stiffness(Linearization(self.mesh, configuration, start, matrix), time)
-        return matrix
+        return self._loaded(Linearization(self.mesh, configuration, start, matrix, least == 0.0), time)
 
-    def _add_stiffness(self, linearization: Linearization, time: float) -> None:
-        """Adds the terms that the kernels leave out: nonlocal twist, and the loads."""
+    def _loaded(self, linearization: Linearization, time: float) -> Stiffness:
+        """The stiffness with the terms that the kernels leave out: nonlocal twist, and the loads."""
         if self.law.nonlocal_twist is not None:
             linearization.nonlocal_twist(self._unit_responses(linearization.configuration), self.law.nonlocal_twist)
         for load in self.loads:
             load.add_stiffness(time, linearization)
+        return linearization.stiffness
 
     def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""

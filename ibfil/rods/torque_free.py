@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..linalg.stiffness import Stiffness
 from .base import TangentReversed
 from .elastic_force import Moment
 from .frame import transport
@@ -161,11 +162,10 @@ class TorqueFree(RodSystem):
 
     def _stiffness(
         self, configuration: Configuration, start: Configuration, moment: Moment, time: float, least: float
-    ) -> np.ndarray:
-        """The Jacobian of ``forces`` by bands, with tensions not below ``least``."""
+    ) -> Stiffness:
+        """The Jacobian of ``forces``, with tensions not below ``least``."""
         matrix = _Jacobian(self, configuration, start, moment, least).matrix
-        self._add_stiffness(_BisectorLinearization(self.mesh, configuration, start, matrix), time)
-        return matrix
+        return self._loaded(_BisectorLinearization(self.mesh, configuration, start, matrix, least == 0.0), time)
 
 
 class _BisectorLinearization(Linearization):

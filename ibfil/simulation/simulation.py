@@ -366,7 +366,7 @@ class Simulation:
             self.fluid.recall(memory)
         if self.model.noise is not None:
             self.model.noise.restore(str(state["random"]))
-        self.rods.contact.restore(number)
+        self.rods.contact.restore({**array, **number})
 
     def _same_start(self, began: np.ndarray) -> None:
         """Clamps and tethers hold the start shape, so it must be the one the run began with."""

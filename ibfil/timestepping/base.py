@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import StepFailed
 from ..fluids.base import Fluid, Response, Solution
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Stiffness
 from ..rods.geometry import Configuration
 
 
@@ -58,19 +59,19 @@ class System(Protocol):
     def forces(self, configuration: Configuration, time: float) -> tuple[np.ndarray, Any]:
         """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""
 
-    def stiffness(self, configuration: Configuration, start: Configuration, moment: Any, time: float) -> np.ndarray:
-        """The Jacobian of the forces with respect to y, a band matrix by node."""
+    def stiffness(self, configuration: Configuration, start: Configuration, moment: Any, time: float) -> Stiffness:
+        """The Jacobian of the forces with respect to y."""
 
     def definite_stiffness(
         self, configuration: Configuration, start: Configuration, moment: Any, time: float
-    ) -> np.ndarray:
+    ) -> Stiffness:
         """The same without compressive geometric stiffness, the part that may make it indefinite."""
 
     def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""
 
 
-Stiffness = Callable[[Configuration, Configuration, Any, float], np.ndarray]  # one of the two of the rods
+StiffnessOf = Callable[[Configuration, Configuration, Any, float], Stiffness]  # one of the two of the rods
 
 
 class NotConverged(StepFailed):

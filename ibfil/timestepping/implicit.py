@@ -11,7 +11,7 @@ from numba import njit
 from ..fluids.base import Fluid, Response, Solution
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
-from .base import FAILURES, NotConverged, State, Step, Stiffness, System, _finish
+from .base import FAILURES, NotConverged, State, Step, StiffnessOf, System, _finish
 
 
 @njit(cache=True)
@@ -36,7 +36,7 @@ class _Equation(NamedTuple):
     target: np.ndarray  # (n, m)
     held: Prescribed
 
-    def correction(self, y: np.ndarray, configuration: Configuration, stiffness: Stiffness) -> tuple[Solution, float]:
+    def correction(self, y: np.ndarray, configuration: Configuration, stiffness: StiffnessOf) -> tuple[Solution, float]:
         """Newton's correction of y, with the exact or the definite ``stiffness`` of the system, and its size."""
         force, inner = self.system.forces(configuration, self.time)
         matrix = stiffness(configuration, self.start, inner, self.time)

@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
 from ..rods.system import RodSystem
@@ -66,7 +65,7 @@ class LinearMotion:
     def round_off(self) -> float:
         """The round-off of a nodal force: that of its stiffness times the size of the rods."""
         size = np.abs(self.configuration.r - self.configuration.r.mean(axis=0)).max()
-        return float(np.finfo(float).eps * np.abs(self.stiffness[:, :3]).max() * size)
+        return float(np.finfo(float).eps * np.abs(self.stiffness.band[:, :3]).max() * size)
 
     @cached_property
     def noise(self) -> np.ndarray:
@@ -89,7 +88,7 @@ class LinearMotion:
 
     def elastic(self, x: np.ndarray) -> np.ndarray:
         """A_K x (k,)."""
-        force = banded.multiply(self.stiffness, self.whole(x))
+        force = self.stiffness.times(self.whole(x))
         out: np.ndarray = (self._moved(self._response, force) - self._still).ravel()[self.free]
         return out
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..fluids.base import Fluid
-from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
 from ..rods.system import RodSystem
@@ -41,7 +40,7 @@ def explicit_limit(
         rest = response.forced(zero, held, zero).move
 
         def moved(x: np.ndarray, response=response, rest=rest, dt=dt) -> np.ndarray:
-            return (response.forced(banded.multiply(matrix, x), held, zero).move - rest) / dt
+            return (response.forced(matrix.times(x), held, zero).move - rest) / dt
 
         if last and abs(float(np.linalg.norm(moved(x / np.linalg.norm(x)))) - last) < _SETTLED * last:
             return 2.0 / last

@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import StepFailed
 from ..fluids.base import Fluid, Memoryless, Response, Solution
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Stiffness
 from ..rods.geometry import Configuration, measure
 from ..rods.system import RodSystem
 
@@ -65,7 +66,7 @@ class _SteadyResponse:
         return self._inner.forced(force, held, target - self._moved)
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         return self._inner.implicit(force, stiffness, held, y, target - self._moved)
 
@@ -99,11 +100,11 @@ class SteadyRods:
         """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""
         return self.system.forces(configuration, self.time)
 
-    def stiffness(self, configuration: Configuration, start: Configuration, moment, time: float) -> np.ndarray:
+    def stiffness(self, configuration: Configuration, start: Configuration, moment, time: float) -> Stiffness:
         """The Jacobian of the forces."""
         return self.system.stiffness(configuration, start, moment, self.time)
 
-    def definite_stiffness(self, configuration: Configuration, start: Configuration, moment, time: float) -> np.ndarray:
+    def definite_stiffness(self, configuration: Configuration, start: Configuration, moment, time: float) -> Stiffness:
         """The same without compressive geometric stiffness."""
         return self.system.definite_stiffness(configuration, start, moment, self.time)
 

@@ -21,7 +21,6 @@ import tomli_w
 from ibfil.case.reading import parse_case
 from ibfil.case.schema import Case
 from ibfil.fluids.resistive_force import resist
-from ibfil.linalg.banded import dense
 from ibfil.simulation.simulation import Simulation
 
 
@@ -31,7 +30,7 @@ def diffusion_ratio(case: Case, lag: float) -> float:
     system, shape = simulation.system, simulation.configuration
     n, m = len(shape.r), system.unknowns
     moment = system.moment(shape, 0.0)
-    stiffness = dense(system.stiffness(shape, shape, moment, 0.0)).reshape(n * m, n * m)
+    stiffness = system.stiffness(shape, shape, moment, 0.0).dense().reshape(n * m, n * m)
     root = _inverse_root(simulation.fluid.drag, shape.e3, m)
     scaled = root @ (-0.5 * (stiffness + stiffness.T)) @ root
     rates, modes = np.linalg.eigh(scaled)

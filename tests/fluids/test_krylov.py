@@ -11,6 +11,7 @@ from ibfil.fluids import preconditioner
 from ibfil.fluids.condensation import Newton, NothingCondensed, TwistCondensed
 from ibfil.linalg import gmres
 from ibfil.linalg.constraints import Prescribed
+from ibfil.linalg.stiffness import Pairs, Stiffness
 from ibfil.simulation.simulation import Simulation
 
 MANY = """
@@ -162,28 +163,32 @@ def test_a_stiff_rod_of_many_nodes_is_not_given_up_for_rounding():
     ids=["plain", "twist on the grid", "twist condensed"],
 )
 def test_the_system_of_rods_is_their_statement(unknowns, condensation):
-    """1 - tau M K by its matrix, and by the products that the FFTs are given; two rods, and each of them alone."""
+    """1 - tau M K by its matrix, and by the products that the FFTs are given: all rods, each alone, two linked ones."""
     rng, n, tau = np.random.default_rng(1), 24, 0.3
-    rods = slice(0, 14), slice(14, n)
+    rods = slice(0, 10), slice(10, 15), slice(15, n)
     band = rng.standard_normal((n, unknowns, 7 * unknowns))
     for i, a in np.ndindex(n, 7):
         if not any(rod.start <= i < rod.stop and rod.start <= i + a - 3 < rod.stop for rod in rods):
             band[i, :, a * unknowns : (a + 1) * unknowns] = 0.0
+    # The first rod is closed, its turns too; it is linked to the third by positions.
+    blocks = rng.standard_normal((5, unknowns, unknowns))
+    blocks[3:, 3:], blocks[3:, :, 3:] = 0.0, 0.0
+    stiffness = Stiffness(band, Pairs(np.array([0, 9, 1, 4, 20]), np.array([9, 0, 9, 18, 2]), blocks))
     parts = np.array([0, 2, 5 * unknowns + 1, 15 * unknowns + unknowns - 1, 20 * unknowns])
     zero = np.zeros((n, unknowns))
-    statement = condensation.reduced(Newton(zero, band, Prescribed(parts, np.zeros(5)), zero, zero, tau))
+    statement = condensation.reduced(Newton(zero, stiffness, Prescribed(parts, np.zeros(5)), zero, zero, tau))
     c = statement.force.size // n
-    for rod in (slice(0, n), *rods):
-        within = slice(c * rod.start, c * rod.stop)
+    for group in ((slice(0, n),), *((rod,) for rod in rods), (rods[0], rods[2]), rods):
+        within = np.concatenate([np.arange(c * rod.start, c * rod.stop) for rod in group])
         mobility = np.zeros((c * n, c * n))
-        half = rng.standard_normal((c * (rod.stop - rod.start),) * 2)
-        mobility[within, within] = half + half.T
+        half = rng.standard_normal((len(within),) * 2)
+        mobility[np.ix_(within, within)] = half + half.T
         x = np.zeros(c * n)
-        x[within] = rng.standard_normal(within.stop - within.start)
+        x[within] = rng.standard_normal(len(within))
         pushed = statement.times(statement.free * x)
         pushed[statement.index] += x[statement.index]
         expected = (statement.free * x - tau * mobility @ pushed)[within]
-        system = statement.frozen().system(rod, np.ascontiguousarray(mobility[within, within]), tau)
+        system = statement.frozen().system(group, mobility[np.ix_(within, within)], tau)
         assert np.allclose(system.T @ x[within], expected, rtol=0, atol=1e-10)
         assert np.allclose(gmres.factor(system.copy()).solve(expected), x[within], rtol=0, atol=1e-8)
 

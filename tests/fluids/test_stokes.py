@@ -13,6 +13,7 @@ from ibfil.grid.kernels import KERNELS, Kernel
 from ibfil.grid.periodic_grid import Grid
 from ibfil.linalg import gmres
 from ibfil.linalg.constraints import Prescribed
+from ibfil.linalg.stiffness import Stiffness, no_pairs
 
 NOTHING = Prescribed(np.zeros(0, np.int64), np.zeros(0))
 
@@ -224,4 +225,4 @@ def test_fft_solve_that_does_not_converge_says_so_as_a_singular_matrix_does(monk
     response = fluid.response(np.random.default_rng(2).uniform(-0.5, 0.5, (n, 3)), np.zeros((n, 3)), 0.0, 0.1)
     zero = np.zeros((n, 3))
     with pytest.raises(np.linalg.LinAlgError, match="GMRES"):
-        response.implicit(np.ones((n, 3)), np.zeros((n, 3, 15)), NOTHING, zero, zero)
+        response.implicit(np.ones((n, 3)), Stiffness(np.zeros((n, 3, 15)), no_pairs(3)), NOTHING, zero, zero)

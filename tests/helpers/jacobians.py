@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibfil.linalg import banded
 from ibfil.rods.system import RodSystem
 
 
@@ -29,7 +28,7 @@ def assert_exact_jacobian(rods: RodSystem, start, y: np.ndarray) -> None:
     """
     shape = rods.move(start, y)
     _, moment = rods.forces(shape, 0.0)
-    exact = banded.dense(rods.stiffness(shape, start, moment, 0.0))
+    exact = rods.stiffness(shape, start, moment, 0.0).dense()
     numerical = numerical_jacobian(rods, start, y)
     for rows in (slice(0, 3), slice(3, 4)):
         for columns in (slice(0, 3), slice(3, 4)):

@@ -32,7 +32,7 @@ def stiffness(parts: list[Segmented], m: int) -> tuple[np.ndarray, banded.Profil
     r = np.stack([s, 0.2 * np.sin(3 * s), 0.3 * np.cos(4 * s)], axis=1)
     shape = rods.start(r, np.tile([0.1, 1.0, 0.2], (len(s), 1)))
     _, moment = rods.forces(shape, 0.0)
-    return rods.stiffness(shape, shape, moment, 0.0), rods.profile
+    return rods.stiffness(shape, shape, moment, 0.0).band, rods.profile
 
 
 def randomly(matrix: np.ndarray, seed: int) -> np.ndarray:

@@ -18,7 +18,6 @@ from helpers.scenes import rms, run, scene, slopes, swimmer, twisting_rod
 from scipy.optimize import brentq
 
 from ibfil.case.schema import Case
-from ibfil.linalg import banded
 from ibfil.simulation.simulation import Simulation
 
 GRIDS = (33, 65, 129)
@@ -58,7 +57,7 @@ def transverse(case: Case, strain: float = 0.0, turned: np.ndarray | None = None
     r = np.outer(simulation.arclength * (1 + strain), [1.0, 0.0, 0.0])
     shape = rods.start(r, np.stack([np.zeros(n), np.cos(angle), np.sin(angle)], axis=1))
     _, moment = rods.forces(shape, 0.0)
-    k = banded.dense(rods.stiffness(shape, shape, moment, 0.0))[1:, 1:3, 1:, 1:3]
+    k = rods.stiffness(shape, shape, moment, 0.0).dense()[1:, 1:3, 1:, 1:3]
     k /= ZETA * rods.mesh.volume[1:, None, None, None]
     return k.reshape(2 * (n - 1), 2 * (n - 1))
 
@@ -146,7 +145,7 @@ def test_twist_diffuses_at_c_pi_squared_whatever_the_bending(bending: list[float
     rods = Simulation(case).system
     shape = Simulation(case).configuration
     _, moment = rods.forces(shape, 0.0)
-    matrix = banded.dense(rods.stiffness(shape, shape, moment, 0.0))
+    matrix = rods.stiffness(shape, shape, moment, 0.0).dense()
     k = matrix[:, 3, :, 3] / (ZETA * 0.01 * L**2 * rods.mesh.volume[:, None])
     k = k[1:, 1:] if clamped else k
     rates = np.sort(-np.linalg.eigvals(k).real) / (c / (ZETA * 0.01 * L**4))

@@ -170,7 +170,8 @@ def test_nothing_of_contact_is_loaded_without_it(tmp_path, contact, loaded):
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from ibfil.commands.main import main\n"
         "assert main(['run', 'rod.toml']) == 0\n"
-        "print('loaded:', {'ibfil.rods.contact', 'ibfil.rods.neighbour_search'} & set(sys.modules))"
+        "print('loaded:', {'ibfil.rods.contact', 'ibfil.rods.neighbour_search'} & set(sys.modules))\n"
+        "assert 'ibfil.linalg.block_sparse' not in sys.modules"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert ("ibfil.rods.contact" in done.stdout) == loaded

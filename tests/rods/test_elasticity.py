@@ -7,7 +7,6 @@ import pytest
 from helpers.jacobians import assert_exact_jacobian
 from helpers.scenes import NoEnds, bare, slopes
 
-from ibfil.linalg import banded
 from ibfil.rods.constitutive import Linear, gather
 from ibfil.rods.elastic_force import Moment, nodal_force
 from ibfil.rods.mesh import Segmented, stack
@@ -169,7 +168,7 @@ def test_without_twist_the_stiffness_is_the_same_block() -> None:
     matrices = []
     for rods in (three, four):
         _, moment = rods.forces(start, 0.0)
-        matrices.append(banded.dense(rods.stiffness(start, start, moment, 0.0)))
+        matrices.append(rods.stiffness(start, start, moment, 0.0).dense())
     assert np.abs(matrices[0] - matrices[1][:, :3, :, :3]).max() < 1e-12 * np.abs(matrices[0]).max()
 
 
@@ -180,7 +179,7 @@ def test_the_definite_stiffness_leaves_out_the_compression_and_nothing_else(kind
     rods = bare(pair(True, 6), kind=kind, unknowns=m, strains=preferred)
     shape = rods.start(wild(len(S)), directors(2 * len(S)))
     _, moment = rods.forces(shape, 0.0)
-    exact, definite = (banded.dense(of(shape, shape, moment, 0.0)) for of in (rods.stiffness, rods.definite_stiffness))
+    exact, definite = (of(shape, shape, moment, 0.0).dense() for of in (rods.stiffness, rods.definite_stiffness))
     mesh, p = rods.mesh, np.sum(moment.bend * shape.bend, axis=1)
     expected = np.zeros_like(exact)
     seen = set()

@@ -13,7 +13,6 @@ from ibfil.assembly import rods as assembly_rods
 from ibfil.assembly.fluids.models import fluid_model
 from ibfil.case.schema import Case
 from ibfil.fluids import resistive_force
-from ibfil.linalg import banded
 from ibfil.linalg.constraints import Prescribed
 from ibfil.rods import mesh
 from ibfil.rods.boundary_conditions import PrescribedEnd, PrescribedEnds, spinning, steady, turned
@@ -256,7 +255,7 @@ def test_moves_and_reactions_are_those_of_lagranges_multipliers(m: int, seed: in
     force, y, target = rng.standard_normal((3, n, m))
     _, moment = system.forces(shape, 0.0)
     matrix = system.stiffness(shape, shape, moment, 0.0)
-    k = banded.dense(matrix).reshape(n * m, n * m)
+    k = matrix.dense().reshape(n * m, n * m)
     tau = 0.03
     answer = (
         resistive_force.ResistiveForce(drag, system.profile)

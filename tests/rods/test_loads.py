@@ -12,7 +12,6 @@ from scipy.integrate import solve_bvp, trapezoid
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
-from ibfil.linalg import banded
 from ibfil.simulation.simulation import Simulation
 
 # Forces
@@ -72,7 +71,7 @@ def growth(force: float, nodes: int, follower: bool) -> float:
     simulation = settled({**rod, "derivative": 2})
     system, shape = simulation.system, simulation.configuration
     _, moment = system.forces(shape, 0.0)
-    k = banded.dense(system.stiffness(shape, shape, moment, 0.0))[1:, 1, 1:, 1]
+    k = system.stiffness(shape, shape, moment, 0.0).dense()[1:, 1, 1:, 1]
     z = np.diag(PERP * system.mesh.volume[1:])
     return float(np.max(eigvals(k, z).real))
 

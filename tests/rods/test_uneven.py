@@ -11,7 +11,6 @@ from helpers.scenes import rms, run, scene, slopes
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
-from ibfil.linalg import banded
 from ibfil.simulation.simulation import Simulation
 
 PERP = 4 * np.pi
@@ -84,7 +83,7 @@ def bending_matrices(rod: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     simulation = settled(rod)
     system, shape = simulation.system, simulation.configuration
     _, moment = system.forces(shape, 0.0)
-    k = banded.dense(system.stiffness(shape, shape, moment, 0.0))[1:, 1, 1:, 1]
+    k = system.stiffness(shape, shape, moment, 0.0).dense()[1:, 1, 1:, 1]
     return k, np.diag(PERP * system.mesh.volume[1:])
 
 
@@ -143,7 +142,7 @@ def test_twist_diffuses_along_an_uneven_rod_at_the_known_rate(spacing: str) -> N
         simulation = Simulation(scene({"rod": rod}))
         system, shape = simulation.system, simulation.configuration
         _, moment = system.forces(shape, 0.0)
-        k = banded.dense(system.stiffness(shape, shape, moment, 0.0))[1:, 3, 1:, 3]
+        k = system.stiffness(shape, shape, moment, 0.0).dense()[1:, 3, 1:, 3]
         rate = -np.max(eigvals(k, np.diag(4 * np.pi * 0.01 * system.mesh.volume[1:])).real)
         errors.append(abs(rate / (0.7 * np.pi**2 / 4 / (4 * np.pi * 0.01)) - 1))
     assert errors[1] < 1e-3

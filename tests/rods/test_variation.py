@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from helpers.scenes import scene
 
-from ibfil.linalg import banded
 from ibfil.rods.constitutive import Linear
 from ibfil.simulation.simulation import Simulation
 
@@ -76,7 +75,7 @@ def test_the_stiffness_of_a_load_is_the_derivative_of_its_force(force: str, m: i
     applied, moment = system.forces(shape, TIME)
     assert np.abs(applied[:N]).max() > 0.01
     assert np.abs(applied[N:]).max() > 0.01
-    exact = banded.dense(system.stiffness(shape, start, moment, TIME))
+    exact = system.stiffness(shape, start, moment, TIME).dense()
     numerical = np.zeros_like(exact)
     for j, c in np.ndindex(y.shape):
         ahead, behind = y.copy(), y.copy()

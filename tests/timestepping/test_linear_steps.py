@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers.scenes import scene
 
-from ibfil.linalg import banded
 from ibfil.simulation.simulation import Simulation
 
 # Pressed together by 2 % and bent: its tension is negative all along.
@@ -24,7 +23,7 @@ def matrices(simulation: Simulation, kind: str) -> tuple[np.ndarray, np.ndarray,
     """Z, the stiffness of that name (27, 27) and f (27,) of the rod as it starts."""
     system, shape, drag = simulation.system, simulation.configuration, simulation.fluid.drag
     force, moment = system.forces(shape, 0.0)
-    k = banded.dense(getattr(system, kind)(shape, shape, moment, 0.0)).reshape(27, 27)
+    k = getattr(system, kind)(shape, shape, moment, 0.0).dense().reshape(27, 27)
     z = np.zeros((9, 3, 9, 3))
     for i, t in enumerate(shape.e3):
         z[i, :, i] = drag.perp[i] * (np.eye(3) - np.outer(t, t)) + drag.par[i] * np.outer(t, t)

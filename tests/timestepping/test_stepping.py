@@ -19,7 +19,6 @@ from ibfil.assembly.fluids.models import fluid_model
 from ibfil.case.schema import Case
 from ibfil.errors import RunFailed
 from ibfil.fluids import resistive_force
-from ibfil.linalg import banded
 from ibfil.rods.geometry import Configuration
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping.base import NotConverged, State
@@ -189,7 +188,7 @@ def test_a_step_solves_its_own_equation_to_the_tolerance(build: Build) -> None:
             resistive_force.resist(drag, before.configuration.e3, state.y_old) / (END / 20) - force - step.reaction
         )
         matrix = system.stiffness(state.configuration, before.configuration, moment, state.time)
-        largest = np.abs(matrix).sum(axis=2) + max(drag.perp.max(), drag.spin.max()) / (END / 20)
+        largest = np.abs(matrix.band).sum(axis=2) + max(drag.perp.max(), drag.spin.max()) / (END / 20)
         assert np.all(np.abs(residual) <= 1e-8 * largest)
         assert step.iterations <= 4
 
@@ -277,7 +276,7 @@ def dense_limit(simulation: Simulation) -> float:
     """2 over the largest eigenvalue of Z^-1 K, by LAPACK, held unknowns struck out."""
     system, shape = simulation.system, simulation.configuration
     _, moment = system.forces(shape, simulation.time)
-    k = banded.dense(system.stiffness(shape, shape, moment, simulation.time))
+    k = system.stiffness(shape, shape, moment, simulation.time).dense()
     n, m = k.shape[:2]
     drag = assembly_drag.drag(simulation.case, assembly_rods.rods(simulation.case))
     for i in range(n):

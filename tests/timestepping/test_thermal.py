@@ -12,7 +12,6 @@ from scipy import linalg, stats
 from ibfil.case.reading import parse_case
 from ibfil.check.dimensionless import groups
 from ibfil.fluids import resistive_force
-from ibfil.linalg import banded
 from ibfil.rods.geometry import measure
 from ibfil.simulation.simulation import Simulation
 
@@ -152,7 +151,7 @@ def test_the_stiffness_of_a_straight_rod_at_rest_is_symmetric(ends, spacing, for
         simulation = Simulation(scene({"rod": {**rod, "derivative": derivative}}))
         system, shape = simulation.system, simulation.configuration
         _, inner = system.forces(shape, 0.0)
-        k = banded.dense(system.stiffness(shape, shape, inner, 0.0)).reshape(44, 44)
+        k = system.stiffness(shape, shape, inner, 0.0).dense().reshape(44, 44)
         free = np.setdiff1d(np.arange(44), system.ends.index)
         k = k[np.ix_(free, free)]
         uneven = np.max(np.abs(k - k.T)) / np.max(np.abs(k))

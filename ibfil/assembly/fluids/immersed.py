@@ -71,7 +71,7 @@ class ImmersedModel(FluidModel):
         coupling = grids.coupling(case, rods)
         twists = rods.twists.astype(float) if local else None
         return immersed_boundary.Immersed(
-            *(space, self.kernel, eta, slip, spin, self.flow, twists, rods.nodes, number, coupling)
+            *(space, self.kernel, eta, slip, spin, self.flow, twists, rods.groups, number, coupling)
         )
 
     def method(self, rods: RodStack) -> str:

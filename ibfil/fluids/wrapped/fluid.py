@@ -19,6 +19,7 @@ import numpy as np
 
 from ...linalg import banded
 from ...linalg.constraints import Prescribed
+from ...linalg.stiffness import Stiffness, no_pairs
 from ..base import Fluid, Response, Solution
 
 
@@ -55,8 +56,8 @@ class _Response:
         self.inner, self.keeps, self.tau = inner, inner.keeps, tau
         self._frozen, self._width = frozen, width
         self._sums: tuple[np.ndarray, np.ndarray] | None = None  # z, and Z/tau by bands
-        self._softened: tuple[np.ndarray, np.ndarray] | None = None  # a stiffness, and the same less Z/tau
-        self._alone: tuple[np.ndarray, np.ndarray] | None = None  # held unknowns, and - Z/tau
+        self._softened: tuple[Stiffness, Stiffness] | None = None  # a stiffness, and the same less Z/tau
+        self._alone: tuple[np.ndarray, Stiffness] | None = None  # held unknowns, and - Z/tau
 
     def _own(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """z (n, m), and Z/tau (n, m, ..)."""
@@ -67,18 +68,19 @@ class _Response:
                 one.add(*self._sums)
         return self._sums
 
-    def _less(self, stiffness: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """K - Z/tau: one array for one K where the fluid keeps factors; else in the room of K, which is used up."""
+    def _less(self, stiffness: Stiffness, own: np.ndarray) -> Stiffness:
+        """K - Z/tau: one for one K where the fluid keeps factors; else in the room of K, which is used up."""
         if not self.keeps:
-            return np.subtract(stiffness, own, out=stiffness)
+            np.subtract(stiffness.band, own, out=stiffness.band)
+            return stiffness
         if self._softened is None or self._softened[0] is not stiffness:
-            self._softened = stiffness, stiffness - own
+            self._softened = stiffness, stiffness._replace(band=stiffness.band - own)
         return self._softened[1]
 
-    def _minus(self, own: np.ndarray, held: Prescribed) -> np.ndarray:
-        """-Z/tau: one array for the same held unknowns where the fluid keeps factors, else a new one each time."""
+    def _minus(self, own: np.ndarray, held: Prescribed) -> Stiffness:
+        """-Z/tau: one for the same held unknowns where the fluid keeps factors, else a new one each time."""
         if self._alone is None or self._alone[0] is not held.at or not self.keeps:
-            self._alone = held.at, -own
+            self._alone = held.at, Stiffness(-own, no_pairs(own.shape[1]))
         return self._alone[1]
 
     def _of_rods(self, answer: Solution, y: np.ndarray, target: np.ndarray) -> Solution:
@@ -98,7 +100,7 @@ class _Response:
         return self._of_rods(self.inner.implicit(given, self._minus(own, held), held, y, target), y, target)
 
     def implicit(
-        self, force: np.ndarray, stiffness: np.ndarray, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         """One Newton correction."""
         constant, own = self._own(force.shape)

@@ -1,0 +1,114 @@
+"""The stiffness of rods that may be coupled: a band matrix by node, and blocks for pairs of nodes beyond the band.
+
+Forces of a rod reach a few nodes to either side: a band. Links, contact and the closure of rings couple any two nodes:
+a list of blocks. Where nothing is coupled the list is empty, and costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from . import banded
+
+NO_NODES = np.zeros(0, np.int64)
+
+
+class Pairs(NamedTuple):
+    """Blocks for pairs of nodes: of node ``rows[k]`` by node ``columns[k]``; a pair may come more than once."""
+
+    rows: np.ndarray  # (l,)
+    columns: np.ndarray  # (l,)
+    blocks: np.ndarray  # (l, m, m)
+
+
+@cache
+def no_pairs(m: int) -> Pairs:
+    """None, of m unknowns a node."""
+    return Pairs(NO_NODES, NO_NODES, np.zeros((0, m, m)))
+
+
+class Stiffness(NamedTuple):
+    """K of n nodes with m unknowns: a band matrix by node (banded.py), and blocks for pairs of nodes."""
+
+    band: np.ndarray  # (n, m, (2 w + 1) m)
+    pairs: Pairs
+
+    @property
+    def coupled(self) -> bool:
+        """Whether there is more than the band."""
+        return self.pairs.rows.size > 0
+
+    def copy(self) -> Stiffness:
+        """A copy, for what uses its band up; blocks are never written to."""
+        return self._replace(band=self.band.copy())
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """K x (n, m) for x (n, m)."""
+        out = banded.multiply(self.band, x)
+        if self.coupled:
+            _add_products(*self.pairs, x, out)
+        return out
+
+    def dense(self) -> np.ndarray:
+        """The same matrix in full, (n, m, n, m)."""
+        out = banded.dense(self.band)
+        for i, j, block in zip(*self.pairs, strict=True):
+            out[i, :, j] += block
+        return out
+
+    def transposed_product(self, full: np.ndarray, factor: float) -> np.ndarray:
+        """``factor`` K^T A (n, m, l) of K and a full A (c n, l), c = 3 or 4: of K, the first c rows a node."""
+        out = banded.transposed_product(self.band, full, factor)
+        if self.coupled:
+            _add_transposed_products(*self.pairs, full, factor, out)
+        return out
+
+    def of(self, ranges: Sequence[slice]) -> Stiffness:
+        """K of some rods by themselves, one after the other: all nodes of each, in ``ranges``."""
+        n = len(self.band)
+        if len(ranges) == 1 and ranges[0] == slice(0, n):
+            return self
+        band = self.band[ranges[0]] if len(ranges) == 1 else np.concatenate([self.band[rod] for rod in ranges])
+        if not self.coupled:
+            return Stiffness(band, self.pairs)
+        place = np.full(n, -1)
+        place[nodes_of(ranges)] = np.arange(len(band))
+        rows, columns = place[self.pairs.rows], place[self.pairs.columns]
+        inside = (rows >= 0) & (columns >= 0)
+        return Stiffness(band, Pairs(rows[inside], columns[inside], self.pairs.blocks[inside]))
+
+
+def nodes_of(ranges: Sequence[slice]) -> np.ndarray:
+    """The nodes (k,) of ranges, one after the other."""
+    return np.concatenate([np.arange(rod.start, rod.stop) for rod in ranges])
+
+
+@njit(cache=True)
+def _add_products(rows, columns, blocks, x, out):
+    """Adds the products of the blocks with x (n, m) to ``out`` (n, m)."""
+    m = x.shape[1]
+    for k in range(rows.size):
+        i, j = rows[k], columns[k]
+        for a in range(m):
+            for b in range(m):
+                out[i, a] += blocks[k, a, b] * x[j, b]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _add_transposed_products(rows, columns, blocks, full, factor, out):
+    """Adds ``factor`` B^T A of each block B to ``out`` (n, m, l); A (c n, l)."""
+    n, m, length = out.shape
+    c = full.shape[0] // n
+    for k in range(rows.size):
+        i, j = rows[k], columns[k]
+        for a in range(c):
+            for b in range(m):
+                value = factor * blocks[k, a, b]
+                if value != 0.0:
+                    for e in range(length):
+                        out[j, b, e] += value * full[c * i + a, e]
