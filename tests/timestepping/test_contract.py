@@ -154,7 +154,7 @@ def coupled(a: Asked) -> Asked:
     rng, (n, m) = np.random.default_rng(5), a.force.shape
     rows, columns = rng.integers(0, n, (2, 12))
     columns = np.where(columns == rows, (rows + n // 2) % n, columns)
-    blocks = np.abs(a.stiffness.band).mean() * rng.standard_normal((12, m, m))
+    blocks = 0.1 * np.abs(a.stiffness.band).mean() * rng.standard_normal((12, m, m))
     for node in range(n):  # what is not there stays so: nodes that do not twist
         if not a.stiffness.band[node, m - 1].any():
             blocks[rows == node, 3], blocks[columns == node, :, 3] = 0.0, 0.0
