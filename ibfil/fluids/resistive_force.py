@@ -9,6 +9,7 @@ coupled, factors in an order of little fill (block_sparse.py).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -210,7 +211,7 @@ class _Rows(NamedTuple):
 class LinearStep(NamedTuple):
     """y -> (1 - tau M K)^-1 y for displacements y (n, m) of nodes at frozen positions."""
 
-    system: banded.Factored
+    solve: Callable[[np.ndarray], np.ndarray]  # by the factors of Z/tau - K, of right sides (n, m)
     drag: Drag
     e3: np.ndarray
     held: np.ndarray
@@ -218,9 +219,9 @@ class LinearStep(NamedTuple):
 
     def __call__(self, y: np.ndarray, /) -> np.ndarray:
         """The displacements (n, m) a step later."""
-        right = resist(self.drag, self.e3, y / self.tau).ravel()
-        right[self.held] = 0.0
-        return self.system.solve(right).reshape(y.shape)
+        right = resist(self.drag, self.e3, y / self.tau)
+        right.ravel()[self.held] = 0.0
+        return self.solve(right)
 
 
 class ResistiveForce(Memoryless):
@@ -258,18 +259,22 @@ class ResistiveForce(Memoryless):
         """Drag of each node about the tangents e3, in the background flow of ``time``."""
         return _Response(self, e3, self.advected(r, e3, time), tau)
 
-    def linear_step(self, e3: np.ndarray, stiffness: np.ndarray, held: np.ndarray, tau: float) -> LinearStep:
+    def linear_step(self, e3: np.ndarray, stiffness: Stiffness, held: np.ndarray, tau: float) -> LinearStep:
         """The step y -> (1 - tau M K)^-1 y of displacements (n, m), zero at the unknowns ``held`` (k,); factored.
 
         Raises numpy.linalg.LinAlgError where it is singular.
         """
-        system, m = -stiffness, stiffness.shape[1]
-        _add_drag(system, self.drag, e3, 1.0 / tau)
-        here = (stiffness.shape[2] - m) // 2
-        for node, part in zip(held // m, held % m, strict=True):
-            system[node, part] = 0.0
-            system[node, part, here + part] = 1.0
-        return LinearStep(banded.Factored(system), self.drag, e3, held, tau)
+        band, (rows, columns, blocks) = -stiffness.band, stiffness.pairs
+        n, m = band.shape[:2]
+        _add_drag(band, self.drag, e3, 1.0 / tau)
+        _hold(band, np.empty((n, m)), held, np.zeros(held.size))
+        if not stiffness.coupled:
+            factors = banded.Factored(band)
+            return LinearStep(lambda right: factors.solve(right.ravel()).reshape(n, m), self.drag, e3, held, tau)
+        free = np.ones((n, m))
+        free.ravel()[held] = 0.0
+        pairs = Pairs(rows, columns, -blocks * free[rows][:, :, None])
+        return LinearStep(self.coupled.factored(Stiffness(band, pairs)), self.drag, e3, held, tau)
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float

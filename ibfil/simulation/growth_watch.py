@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..fluids.resistive_force import ResistiveForce
 from ..timestepping.base import FAILURES, State
 from ..timestepping.growth import Mode, growing
 from ..timestepping.semi_implicit import SemiImplicit
@@ -38,8 +37,7 @@ class GrowthWatch:
 
     def __init__(self, model: Model) -> None:
         self._model, self._system = model, model.rods.system
-        flow = model.fluid_model.flow
-        self._fluid = ResistiveForce(model.fluid_model.local_drag(model.rods), self._system.profile, flow)
+        self._fluid = model.fluid_model.local_fluid(model.rods)
         filaments = model.case.filaments.values()
         self._slowest = timescales.slowest_bending(model)
         drag = {id(f): model.fluid_model.drag(f) for f in filaments}

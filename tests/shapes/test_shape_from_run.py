@@ -105,7 +105,7 @@ def test_other_nodes_lie_on_the_curve_through_its_nodes(tmp_path):
         ([from_run("no.h5")], "there is no such file"),
         ([from_run("a.h5", "1.5e-5")], "has no output at t = 1.5e-05; the nearest is at 1e-05"),
         ([from_run("a.h5"), "filament.rod.length=2"], "its filament rod has length 1; this one has 2"),
-        ([from_run("a.toml")], "is not a run file of ibfil"),
+        ([from_run("a.toml")], "is a case, not a run file"),
     ],
 )
 def test_what_cannot_be_taken_up_is_one_line(tmp_path, changes, told):

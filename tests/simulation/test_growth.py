@@ -10,8 +10,7 @@ from helpers.scenes import RFT, scene
 
 from ibfil.check.report import report
 from ibfil.check.warnings import warnings
-from ibfil.fluids.resistive_force import ResistiveForce, mobilize
-from ibfil.linalg import banded
+from ibfil.fluids.resistive_force import mobilize
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping.growth import growing
 
@@ -39,13 +38,13 @@ def test_the_leading_mode_is_that_of_the_dense_matrix(load: dict[str, float]) ->
     simulation = column(1.0, **load, step=1e-4)
     simulation.advance(2e-4, lambda: None)
     system, here, time = simulation.system, simulation.configuration, simulation.time
-    fluid = ResistiveForce(simulation.model.fluid_model.local_drag(simulation.rods), system.profile)
+    fluid = simulation.model.fluid_model.local_fluid(simulation.rods)
     force, inner = system.forces(here, time)
     stiffness = system.stiffness(here, here, inner, time)
     size, held = force.size, system.ends.index
     mobility = np.stack([mobilize(fluid.drag, here.e3, x.reshape(force.shape)).ravel() for x in np.eye(size)], axis=1)
     moving = np.setdiff1d(np.arange(size), held)
-    jacobian = (mobility @ banded.dense(stiffness).reshape(size, size))[np.ix_(moving, moving)]
+    jacobian = (mobility @ stiffness.dense().reshape(size, size))[np.ix_(moving, moving)]
     values = np.linalg.eigvals(jacobian)
     leading = values[np.argmax(values.real)]
     begin = np.random.default_rng(3).standard_normal(force.shape)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...case.schema import Case
     from ...fluids.base import Flow, Fluid
     from ...fluids.output import FluidOutput
-    from ...fluids.resistive_force import Drag
+    from ...fluids.resistive_force import Drag, ResistiveForce
     from ...fluids.spaces.flow_of_forces import FlowOfForces
     from ...grid.periodic_grid import Lattice
     from ...io.snapshots import Snapshot
@@ -117,6 +117,14 @@ class FluidModel(ABC):
     @abstractmethod
     def local_drag(self, rods: RodStack) -> Drag:
         """The drag of every node by itself: all there is in resistive-force theory; elsewhere for time scales."""
+
+    def local_fluid(self, rods: RodStack) -> ResistiveForce:
+        """The fluid of that drag, in the background flow."""
+        from ...fluids.resistive_force import ResistiveForce
+
+        mesh, twists = rods.system.mesh, rods.twists.astype(float) if rods.system.unknowns == 4 else None
+        spacing = float(np.min(mesh.ds[mesh.joined]))
+        return ResistiveForce(self.local_drag(rods), rods.system.profile, self.flow, twists, spacing)
 
     def automatic_limit(self, longest: float) -> float:
         """The longest automatic step, given the ``longest`` that the fluid's own motion allows."""

@@ -28,11 +28,7 @@ class ResistiveForceModel(FluidModel):
 
     def build(self, rods: RodStack) -> Fluid:
         """Drag per node, in the background flow."""
-        from ...fluids.resistive_force import ResistiveForce
-
-        mesh, twists = rods.system.mesh, rods.twists.astype(float) if rods.system.unknowns == 4 else None
-        spacing = float(np.min(mesh.ds[mesh.joined]))
-        return ResistiveForce(drag(self.case, rods), rods.system.profile, self.flow, twists, spacing)
+        return self.local_fluid(rods)
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """The heat of drag."""
