@@ -87,13 +87,21 @@ def q_criterion(velocity: np.ndarray, spacing: np.ndarray) -> np.ndarray:
     """Q = (|W|^2 - |S|^2)/2 (nx, ny, nz) of a velocity (nx, ny, nz, 3), the excess of rotation over strain.
 
     -tr(G G)/2 + tr(G)^2/2 of the gradient G by central differences of second order, one-sided at the faces: a
-    background flow need not be periodic. Hunt, Wray and Moin, Center for Turbulence Research report S88, 1988.
+    background flow need not be periodic; along an axis with one point zero. Hunt, Wray and Moin, Center for Turbulence
+    Research report S88, 1988.
     """
-    gradient = np.stack(
-        [np.stack(np.gradient(velocity[..., c].astype(float), *spacing, edge_order=2)) for c in range(3)]
-    )
+    u = np.moveaxis(velocity.astype(float), -1, 0)
+    gradient = np.stack([_derivative(u, axis, spacing[axis - 1]) for axis in (1, 2, 3)], axis=1)
     trace = np.einsum("aa...->...", gradient)
     return 0.5 * (trace**2 - np.einsum("ab...,ba...->...", gradient, gradient))
+
+
+def _derivative(values: np.ndarray, axis: int, spacing: float) -> np.ndarray:
+    """By central differences, at the ends of the second order that so many points allow; of one point zero."""
+    points = values.shape[axis]
+    if points == 1:
+        return np.zeros_like(values)
+    return np.asarray(np.gradient(values, spacing, axis=axis, edge_order=min(2, points - 1)))
 
 
 def polylines(

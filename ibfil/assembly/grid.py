@@ -45,6 +45,14 @@ def cells_of_thickness(case: Case) -> tuple[int, int, int]:
                 f"of cells on all axes of box = {list(box)}; allowed: for example box = {[round(x, 10) for x in fits]}"
             ]
         )
+    if min(found) < kernel(case).points:
+        raise CaseError(
+            [
+                f"{case.file}: fluid.thickness: found {thickness:g}, for which box = {list(box)} has cells = "
+                f"{list(found)}; allowed: at least {kernel(case).points} on each axis, the width of the kernel (sheets "
+                "have no thickness: give cells, one of them 1)"
+            ]
+        )
     return found
 
 

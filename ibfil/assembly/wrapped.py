@@ -11,30 +11,68 @@ from .profiles import alone, half
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
+    from ..case.schema import Case
     from ..fluids.base import Fluid
+    from ..fluids.wrapped.fluid import VelocityForce
+    from ..fluids.wrapped.mass import Mass
     from ..fluids.wrapped.thickness import Thickness
     from .fluids.base import FluidModel
     from .stacked import RodStack
 
+START = 1e-9  # of the run's time: over it a support's first velocity is taken
 STRAIGHT = 1e-6  # of its length: deviation of a straight rod's nodes from a line
 
 
 class Surrounding(NamedTuple):
-    """The fluid as rods know it, the fluid inside it, and the couple across the thickness of the rods, or None."""
+    """The fluid as rods know it, the fluid inside, the couple across the rods' thickness and their inertia, or None."""
 
     fluid: Fluid
     inner: Fluid
     thickness: Thickness | None
+    mass: Mass | None
 
 
 def surrounding(model: FluidModel, rods: RodStack) -> Surrounding:
     """The fluid of the model around these rods. Raises CaseError where it cannot be made."""
-    inner, thick = model.build(rods), thickness(model, rods)
-    if thick is None:
-        return Surrounding(inner, inner, None)
+    inner, thick, heavy = model.build(rods), thickness(model, rods), mass(model.case, rods)
+    forces: list[VelocityForce] = [force for force in (thick, heavy) if force is not None]
+    if not forces:
+        return Surrounding(inner, inner, None, None)
     from ..fluids.wrapped.fluid import Wrapped
 
-    return Surrounding(Wrapped(inner, [thick], rods.system.profile.width), inner, thick)
+    return Surrounding(Wrapped(inner, forces, rods.system.profile.width), inner, thick, heavy)
+
+
+def mass(case: Case, rods: RodStack) -> Mass | None:
+    """The inertia of the rods, their velocity at the start, which is that of supports; None: they have no inertia."""
+    if not case.heavy:
+        return None
+    from ..fluids.wrapped.mass import Mass
+
+    system = rods.system
+    inertia, velocity = np.zeros((2, len(rods.s), system.unknowns))
+    for filament, where in zip(rods.filaments, rods.nodes, strict=True):
+        if filament.mass is None:
+            continue
+        s, volume = rods.s[where], system.mesh.volume[where]
+        inertia[where, :3] = (alone(filament.mass, s) * volume)[:, None]
+        if filament.twisting is not None:
+            inertia[where, 3] = rotary_inertia(filament, s) * volume
+        if filament.velocity is not None:
+            velocity[where, :3] = np.column_stack([alone(component, s) for component in filament.velocity])
+    moment = START * case.time.end
+    held = system.held(0.0, moment)
+    velocity.ravel()[held.at] = held.value / moment
+    return Mass(inertia, velocity)
+
+
+def rotary_inertia(filament: Filament, s: np.ndarray) -> np.ndarray | float:
+    """The moment of inertia about the tangent per length (k,) at arclengths s (k,): given, or that of a round rod."""
+    if filament.rotary_inertia is not None:
+        return alone(filament.rotary_inertia, s)
+    if filament.mass is None or filament.radius is None:
+        return 0.0
+    return 0.5 * alone(filament.mass, s) * alone(filament.radius, s) ** 2
 
 
 def thickness(model: FluidModel, rods: RodStack) -> Thickness | None:

@@ -23,6 +23,7 @@ from .values import (
     Range,
     Real,
     Seed,
+    TripleS,
     TripleST,
     TripleSTXYZ,
     TripleT,
@@ -202,6 +203,13 @@ class Filament(Table):
     twisting: OfS | None = Field(None, description="twist modulus C > 0; absent: no twist, planar scenes only")
     stretching: OfS = Field(description="axial stiffness EA > 0, a force (the paper's sigma0)", examples=[1e4])
     radius: OfS | None = Field(None, description="material radius > 0; required with twisting unless drag gives spin")
+    mass: OfS | None = Field(
+        None, description="mass per length; navier-stokes: beyond that of the fluid displaced. Absent: no inertia"
+    )
+    rotary_inertia: OfS | None = Field(
+        None, description="moment of inertia about the tangent, per length; absent: mass radius^2/2"
+    )
+    velocity: TripleS | None = Field(None, description="with mass: velocity at t = 0, lab frame; absent: at rest")
     law: Law = Field(Linear(), description="moment against strain")
     curvature: PairST = Field((ZERO, ZERO), description="preferred curvatures kappa1, kappa2")
     twist_rate: OfST = Field(ZERO, description="preferred twist tau0")

@@ -87,7 +87,10 @@ class Fluid(Table):
         ]
         | None
     ) = Field(None, description="periodic box, or free: no box, for stokes; required by grid fluids")
-    cells: Cells | None = Field(None, description="cells along x, y, z of a box, one h on all axes; or thickness")
+    cells: Cells | None = Field(
+        None,
+        description="cells along x, y, z of a box, one h on all axes; one along an axis: a plane flow. Or thickness",
+    )
     thickness: Positive | None = Field(
         None, description="hydrodynamic line radius that chooses the cells, or the spacing of free space"
     )
@@ -133,6 +136,11 @@ class Fluid(Table):
     def inertial(self) -> bool:
         """Whether the fluid has inertia, and so a history."""
         return self.model == "navier-stokes"
+
+    @property
+    def thin_axis(self) -> int | None:
+        """The axis along which the grid is one cell deep, so that its flow is plane; None: it has none."""
+        return None if self.cells is None or 1 not in self.cells else self.cells.index(1)
 
     @property
     def couples_torque(self) -> bool:

@@ -214,6 +214,11 @@ class Scene(Table):
         return any(filament.twisting is not None for filament in self.filaments.values())
 
     @property
+    def heavy(self) -> bool:
+        """Whether any filament has a mass."""
+        return any(filament.mass is not None for filament in self.filaments.values())
+
+    @property
     def couples_torque(self) -> bool:
         """Whether twist torques go onto the grid."""
         return self.fluid.couples_torque and self.twists

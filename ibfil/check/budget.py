@@ -3,7 +3,7 @@
 Only what a case names is counted, because only that is built. Shares of time are of one step, outputs spread over the
 steps between them; that of the rods and of the fluid are those by which the method is chosen (assembly/costs.py), the
 rest was measured against them: twisting 0.7 of what bending and stretching take, contact 1.5, noise 0.1, the couple
-across the thickness 0.5.
+across the thickness 0.5, mass 0.3.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
 _TWISTING = 0.7  # of the step of bending and stretching
-_CONTACT, _NOISE, _COUPLE = 1.5, 0.1, 0.5  # the same of an implicit one
+_CONTACT, _NOISE, _COUPLE, _MASS = 1.5, 0.1, 0.5, 0.3  # the same of an implicit one
 OWN = "forces by velocity"
 
 
@@ -39,6 +39,8 @@ def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
         out.append(Term("thermal noise", _NOISE * implicit, 8.0 * unknowns * n))
     if simulation.model.thickness is not None:
         out.append(Term("couple across the thickness", _COUPLE * implicit, memory[OWN]))
+    if simulation.model.mass is not None:
+        out.append(Term("mass", _MASS * implicit, 0.0 if simulation.model.thickness is not None else memory[OWN]))
     rest = {name: size for name, size in memory.items() if name != OWN}
     return out + simulation.model.fluid_model.terms(simulation.rods, rest, simulation.step_length)
 

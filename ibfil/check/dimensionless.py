@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,34 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
     out["EA L^2/A"] = stretching * length**2 / bending
     if case.thermal is not None and case.thermal.energy > 0:
         out["A/(kT L)"] = bending / (case.thermal.energy * length)
+    if filament.mass is not None:
+        drag = simulation.drag(filament)
+        time = 1 / rate if rate else simulation.bending_time()
+        out["m/(zeta T), inertia of the rod"] = timescales.mean_mass(filament) / (drag * time)
     return out | simulation.model.fluid_model.groups(filament, rate)
+
+
+class Oscillation(NamedTuple):
+    """The slowest bending of a rod with mass, where it oscillates: omega and decay, and what the step makes of them."""
+
+    omega: float
+    decay: float
+    seen_omega: float
+    seen_decay: float
+
+
+def oscillations(simulation: Simulation) -> dict[str, Oscillation]:
+    """Those of the scene by filament; in a fluid with inertia, or of several rods, only about those of each alone."""
+    out = {}
+    for name, filament in simulation.case.filaments.items():
+        if filament.mass is None:
+            continue
+        root = timescales.bending_roots(filament, simulation.drag(filament))[0]
+        if root.imag:
+            root = complex(root.real, abs(root.imag))
+            seen = timescales.seen(root, simulation.step_length, simulation.case.time.order)
+            out[name] = Oscillation(root.imag, -root.real, seen.imag, -seen.real)
+    return out
 
 
 def _in_shear(simulation: Simulation, name: str) -> dict[str, float]:

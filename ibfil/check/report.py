@@ -16,7 +16,7 @@ from ..simulation.simulation import Simulation
 from ..simulation.steps import AUTOMATIC_ERROR, POINTS_A_PERIOD
 from ..timestepping.step_control import equal_parts
 from .budget import disk, memory, shares, terms
-from .dimensionless import groups
+from .dimensionless import groups, oscillations
 from .warnings import warnings
 
 if TYPE_CHECKING:
@@ -57,6 +57,8 @@ def modelled(case: Case) -> list[str]:
         terms = ["bending", "stretching"] + (["twisting"] if f.twisting is not None else [])
         if any(k.constant != 0 for k in (*f.curvature, f.twist_rate)):
             terms.append("preferred strains")
+        if f.mass is not None:
+            terms.append("mass")
         if not f.law.linear:
             terms.append(f"{f.law.kind} law")
         for side, end in (("start", f.start), ("finish", f.finish)):
@@ -109,7 +111,10 @@ def absent(case: Case) -> list[str]:
         out.append("thermal noise")
     elif not case.thermal.twist and case.twists:
         out.append("thermal twist moments")
-    out.append(f"{fluid.inertia_absent}; walls; heads; closed rods")
+    light = [name for name, filament in case.filaments.items() if filament.mass is None]
+    of = "" if len(light) == len(case.filaments) else f", of {', '.join(light)}"
+    inertia = [fluid.rod_inertia + of] * bool(light) + [fluid.fluid_inertia_absent] * bool(fluid.fluid_inertia_absent)
+    out.append("; ".join([*inertia, "walls", "heads", "closed rods"]))
     return out
 
 
@@ -175,13 +180,17 @@ def _steps(simulation: Simulation) -> list[str]:
         lines += _automatic(simulation)
     if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
         lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
+    limit = (
+        f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)" if not case.heavy else ""
+    )
     return [
         *lines,
-        f"explicit scheme: stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)",
+        f"explicit scheme: {limit}",
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
         *simulation.model.fluid_model.step_lines(),
         *_driven(simulation),
         f"slowest bending time: {simulation.bending_time():.4g}",
+        *ringing(simulation),
     ]
 
 
@@ -228,3 +237,14 @@ def _driven(simulation: Simulation) -> list[str]:
     if load:
         lines.append(f"loads or flow move a rod by its length in {2 * np.pi / load:.4g}")
     return lines
+
+
+def ringing(simulation: Simulation) -> list[str]:
+    """The own oscillation of each rod whose mass makes it one, and what the scheme takes away of it."""
+    out = []
+    for name, found in oscillations(simulation).items():
+        out.append(
+            f"filament {name} oscillates in bending, alone at omega = {found.omega:.4g} with a decay of "
+            f"{found.decay:.3g}; this dt makes that {found.seen_omega:.4g}, {found.seen_decay:.3g}"
+        )
+    return out

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..case.shape import RunShape
 from ..shapes import initial
 from ..simulation import steps
-from .dimensionless import of_filament
+from .dimensionless import of_filament, oscillations
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..simulation.simulation import Simulation
 
 
+SLOWED, DAMPED = 0.02, 0.2  # by which steps may change omega, and the decay, of a rod's own oscillation
 FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
 QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
 THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
@@ -30,6 +32,7 @@ def warnings(simulation: Simulation) -> list[str]:
         key, found = f"filament.{name}", of_filament(simulation, filament)
         out += fluid.warnings_of(simulation, name, found)
         out += _of_held_ends(key, filament)
+        out += _of_inertia(simulation, name, filament)
         where = simulation.nodes(name)
         out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
     return out + _of_given_step(simulation) + _of_run(simulation) + fluid.warnings(simulation)
@@ -46,6 +49,24 @@ def _of_given_step(simulation: Simulation) -> list[str]:
         steps.OWN: simulation.growth_rate(),
     }
     return [steps.too_long(dt, what, rate) for what, rate in rates.items() if steps.is_long(dt, rate)]
+
+
+def _of_inertia(simulation: Simulation, name: str, filament: Filament) -> list[str]:
+    """An oscillation of its own that steps are too long for, and a start that is not known."""
+    out, found = [], oscillations(simulation).get(name)
+    if found is not None and simulation.case.time.tolerance is None:
+        slowed = (1 - found.seen_omega / found.omega) / SLOWED
+        damped = abs(found.seen_decay - found.decay) / (DAMPED * max(found.decay, 0.01 * found.omega))
+        if max(slowed, damped) > 1.0:
+            step = simulation.step_length * max(slowed, damped) ** (-1 / simulation.case.time.order)
+            out.append(
+                f"time.step: filament {name} oscillates at omega = {found.omega:.3g} with a decay of {found.decay:.3g}"
+                f", which steps of {simulation.step_length:.3g} make {found.seen_omega:.3g}, {found.seen_decay:.3g}: "
+                f"take {step:.2g}, or leave it where that is over before it matters"
+            )
+    if filament.mass is not None and isinstance(filament.shape, RunShape) and filament.velocity is None:
+        out.append(f"filament.{name}.shape: the shape of another run, and not its velocity: it starts at rest")
+    return out
 
 
 def _of_held_ends(key: str, filament: Filament) -> list[str]:

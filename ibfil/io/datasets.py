@@ -28,6 +28,7 @@ _DIAGNOSTICS = {
     "stretch_max": ("1", "largest stretch of a segment, length over rest length minus 1"),
     "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
     "power": ("force length/time", "power of the nodal forces and twist torques on the fluid"),
+    "kinetic_energy": ("force length", "kinetic energy of the rods' mass and rotary inertia"),
     "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
     "couple_dissipation": ("force length/time", "the part of it by the couple of flows across the rods' thickness"),
     "grid_power": ("force length/time", "power of the nodal forces upon the grid's own flow"),

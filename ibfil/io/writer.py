@@ -80,9 +80,8 @@ class Recorder:
     ) -> Recorder:
         """Begin a run file with its first output; ``expected`` outputs in all (sizes chunks, no limit).
 
-        ``series`` holds the observables' values, ``meanings`` what they are, ``groups`` the dimensionless numbers of
-        the scene. Raises RunFileError where the file exists and ``overwrite`` is not set, or another process is
-        writing it.
+        ``series`` holds the observables' values, ``meanings`` what they are, ``groups`` the dimensionless numbers.
+        Raises RunFileError where the file exists and ``overwrite`` is not set, or another process is writing it.
         """
         refuse(path, RUN, overwrite)
         refuse(checkpoint_path(path), CHECKPOINT, True)

@@ -29,7 +29,8 @@ FASTER = 25.0  # times the slowest bending rate: where growth is looked for firs
 class SceneAtRest:
     """A simulation's rods and fluid as they would stand still. ``time`` is the slowest bending time of the scene.
 
-    Raises CaseError for a case that is driven in time or whose fluid has a past, RunFailed where held ends move.
+    Raises CaseError for a case that is driven in time, or whose fluid or rods have a past, RunFailed where held ends
+    move.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -89,11 +90,14 @@ class SceneAtRest:
 
 
 def refuse_driven(case: Case) -> None:
-    """Raises CaseError, a line a key, for all that changes in time, and for a fluid that has a past."""
+    """Raises CaseError, a line a key, for all that changes in time, for a fluid that has a past, and for mass."""
     faults = [f"{case.file}: {fault}" for fault in _driven(case)]
     if case.fluid.inertial:
         past = "a fluid with a past has modes of its own"
         faults.append(f"{case.file}: fluid.model: found {case.fluid.model}; allowed: rft, stokes; {past}")
+    heavy = [name for name, filament in case.filaments.items() if filament.mass is not None]
+    without = "allowed: none; rests are the same without it, and modes of rods with mass are not computed"
+    faults += [f"{case.file}: filament.{name}.mass: found a mass; {without}" for name in heavy]
     if faults:
         raise CaseError(faults)
 

@@ -113,6 +113,8 @@ class Diagnostics:
             "steps_shortened": float(now.shortened),
         }
         case, fluid = self._model.case, self._model.fluid
+        if self._model.mass is not None:
+            out["kinetic_energy"] = self._model.mass.energy(now.velocity)
         if case.output.probes and case.fluid.on_grid:
             points = np.array(case.output.probes)
             pushed = self._pushed(now)

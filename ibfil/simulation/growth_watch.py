@@ -26,7 +26,9 @@ SETTLED = 10.0  # of the time in which tension spreads along a rod
 
 
 def may_grow(model: Model) -> bool:
-    """Whether anything in the scene may make its rods unstable."""
+    """Whether anything in the scene may make its rods unstable; with noise or mass it is not looked for."""
+    if model.noise is not None or model.mass is not None:
+        return False
     filaments, loads = model.rods.filaments, model.rods.system.loads
     held = any(end.held for f in filaments for end in (f.start, f.finish))
     return bool(loads) or held or model.fluid_model.flow is not None or any(f.twisting is not None for f in filaments)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..assembly.stacked import RodStack
     from ..case.schema import Case
     from ..fluids.base import Fluid
+    from ..fluids.wrapped.mass import Mass
     from ..fluids.wrapped.thickness import Thickness
     from ..grid.periodic_grid import Lattice
     from ..rods.constitutive import MomentLaw
@@ -30,7 +31,7 @@ class Model:
     """A scene put together. Nothing in it changes as a run goes on, but for what fluid, contact and noise remember.
 
     ``fluid`` is what the rods move in; ``inner`` the same, or what is in it (fluids/wrapped), ``thickness`` the couple
-    across the rods, if there is one. ``method`` names the fluid's path.
+    across the rods and ``mass`` their inertia, where there is one. ``method`` names the fluid's path.
     """
 
     case: Case
@@ -39,6 +40,7 @@ class Model:
     fluid: Fluid
     inner: Fluid
     thickness: Thickness | None
+    mass: Mass | None
     method: str
     noise: Noise | None
     stepper: Stepper

@@ -300,6 +300,8 @@ class Simulation:
         if self._last is None:
             force, _ = self.system.forces(self.state_now.configuration, self.time)
             small, dt = 1e-6 * self.case.time.end / 1000, self.step_length
+            if self.model.mass is not None and not self.case.fluid.inertial:
+                dt *= 1e-3  # a rod with mass has the velocity that it starts with
             index, value = self.system.held(self.time, self.time + small)
             # Over a whole step at the speeds of this moment: a fluid with inertia resists a sudden start without limit.
             held = Prescribed(index, value * (dt / small))

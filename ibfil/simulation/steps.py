@@ -63,7 +63,7 @@ def choose(model: Model, drivers: Drivers) -> Choice:
         return Choice(FixedStep(first, growth), reason, first, "")
     first, reason = _shortest(model, drivers)
     longest, pushed = _pushed(model, drivers)
-    if drivers.repeating or longest <= first:
+    if drivers.repeating or longest <= first or model.mass is not None:
         return Choice(FixedStep(first, growth), reason, first, "")
     rate, error = 2 * np.pi / (POINTS_A_PERIOD * first), AUTOMATIC_ERROR / time.end
     control = AdaptiveStep(error, rate, min(longest, time.end), time.order, system.length, first)
@@ -89,6 +89,9 @@ def _shortest(model: Model, drivers: Drivers) -> tuple[float, str]:
     else:
         slowest = timescales.slowest_bending(model)
         bounds.append((slowest / POINTS_A_PERIOD, "the slowest bending time"))
+    inertial = timescales.inertial_time(model)
+    if min(bounds)[0] < inertial < np.inf:  # what passes within a step leaves no more than a start
+        bounds.append((inertial / POINTS_A_PERIOD, "the time of the rods' inertia"))
     step, what = min(bounds)
     return step, f"a {POINTS_A_PERIOD}th of {what}"
 
@@ -134,7 +137,7 @@ class StepLimits:
         self._points = POINTS_BY_ERROR if by_error else POINTS_A_PERIOD
         self._steady = not by_error  # whether a steady spin counts, which an error can tell
         self._points_of_growth = GROWTH_BY_ERROR if by_error else POINTS_A_PERIOD
-        self.growth = None if model.noise is not None or time.explicit or not may_grow(model) else GrowthWatch(model)
+        self.growth = GrowthWatch(model) if may_grow(model) and not time.explicit else None
         self.breaks = Breaks(drivers.jumps, time.end)
 
     def longest(self, state: State, steps: int, length: float) -> float:

@@ -32,14 +32,15 @@ _SLOWEST = {
 def load_rate(model: Model, drivers: Drivers) -> float:
     """The rate, in radians a time, of what pushes the rods: a turn is the time in which it moves one by its length.
 
-    A force F does that in zeta L^2/F, a flow in L over its change along the rod. Of all filaments the largest; 0 where
-    nothing pushes.
+    A force F does that in zeta L^2/F, or where the rod is heavy in sqrt(2 m L^2/F), a flow in L over its change along
+    the rod. Of all filaments the largest; 0 where nothing pushes.
     """
     loads = [load for load in model.rods.system.loads if load.drives]
     flow, rods, rate = model.fluid_model.flow, model.rods, 0.0
     if not loads and flow is None:
         return 0.0
-    kinds = {id(filament): model.fluid_model.drag(filament) * filament.length**2 for filament in rods.filaments}
+    drag = {id(filament): model.fluid_model.drag(filament) * filament.length**2 for filament in rods.filaments}
+    mass = {id(filament): 2 * mean_mass(filament) * filament.length**2 for filament in rods.filaments}
     for time in _some(drivers):
         force = np.zeros((len(rods.s), rods.system.unknowns))
         for load in loads:
@@ -47,7 +48,9 @@ def load_rate(model: Model, drivers: Drivers) -> float:
         size = np.linalg.norm(force[:, :3], axis=1)
         velocity = None if flow is None else flow(rods.start.r, time)
         for filament, where in zip(rods.filaments, rods.nodes, strict=True):
-            rate = max(rate, float(size[where].sum()) / kinds[id(filament)])
+            total = float(size[where].sum())
+            if total > 0:
+                rate = max(rate, 1 / max(drag[id(filament)] / total, (mass[id(filament)] / total) ** 0.5))
             if velocity is not None:
                 rate = max(rate, float(np.linalg.norm(np.ptp(velocity[where], axis=0))) / filament.length)
     return 2 * np.pi * rate
@@ -74,9 +77,44 @@ def bending_time(drag: float, length: float, bending: float, start: str, finish:
 
 
 def slowest_bending(model: Model) -> float:
-    """Relaxation time of the slowest bending mode of any filament."""
-    filaments, drag = model.case.filaments.values(), model.fluid_model.drag
-    return max(bending_time(drag(f), f.length, softest(f), f.start.end, f.finish.end) for f in filaments)
+    """Relaxation time of the slowest bending mode of any filament; where it oscillates, the time of one radian."""
+    return max(_slowest(f, model.fluid_model.drag(f)) for f in model.case.filaments.values())
+
+
+def _slowest(filament: Filament, drag: float) -> float:
+    own = bending_time(drag, filament.length, softest(filament), filament.start.end, filament.finish.end)
+    return own if filament.mass is None else float(1.0 / np.min(np.abs(bending_roots(filament, drag))))
+
+
+def mean_mass(filament: Filament) -> float:
+    """The mass per length of a filament, its mean; zero where it has none."""
+    if filament.mass is None:
+        return 0.0
+    return float(np.mean(filament.mass.bind("s")(np.linspace(0.0, filament.length, 101))))
+
+
+def bending_roots(filament: Filament, drag: float) -> np.ndarray:
+    """The rates s (2,) of the slowest bending of a filament with mass, m s^2 + zeta s + zeta/(its bending time) = 0."""
+    own = bending_time(drag, filament.length, softest(filament), filament.start.end, filament.finish.end)
+    return np.roots([mean_mass(filament), drag, drag / own])
+
+
+def seen(rate: complex, dt: float, order: int) -> complex:
+    """The rate that e^(rate t) has in steps of dt, by Euler or by BDF2: 3/2 - 2/x + 1/(2 x^2) = rate dt."""
+    z = complex(rate * dt)
+    x = 1.0 / (1.0 - z) if order == 1 else (2.0 + np.sqrt(1.0 + 2.0 * z)) / (3.0 - 2.0 * z)
+    return complex(np.log(x) / dt)
+
+
+def inertial_time(model: Model) -> float:
+    """The shortest time in which inertia shows: a radian of the slowest bending where it oscillates, else m/zeta."""
+    times = [np.inf]
+    for filament in model.case.filaments.values():
+        if filament.mass is not None:
+            drag = model.fluid_model.drag(filament)
+            roots = bending_roots(filament, drag)
+            times.append(1.0 / abs(roots[0]) if roots[0].imag else mean_mass(filament) / drag)
+    return float(min(times))
 
 
 def stretch_by_kicks(model: Model, dt: float) -> float:

@@ -42,6 +42,9 @@ FORCE = "fluid.box: the rods push the fluid with a net force"
         (["fluid.slip=0", "filament.rod.nodes=65"], "filament.rod: nodes are 0.5 cells apart and fluid.slip = 0"),
         (["output.every=0.2"], "output.every: 0.2 is beyond time.end = 0.1"),
         (["fluid.model=rft", "filament.rod.radius=0.3"], ""),  # a grid's matter
+        (["filament.rod.mass=0.1"], ""),  # overdamped
+        (["filament.rod.mass=10"], ""),  # omega = 7.1: dt = 0.01 takes 0.2 % of it
+        (["filament.rod.mass=10", "time.step=0.05"], "time.step: filament rod oscillates at omega = 7.05"),
         (["fluid.thick=true"], ""),
         (["fluid.thick=true", "filament.rod.radius=0.03"], ""),  # the kernel's is 0.0346
         (["fluid.thick=true", "filament.rod.radius=0.02"], "filament.rod.radius: 0.02 makes the couple of the flow"),
@@ -80,3 +83,28 @@ def test_check_says_whether_flows_turn_rods_by_their_thickness():
         parse_case(SCENE, "s.toml", [*flow, "fluid.thick=true", "filament.rod.shape={kind='circle', curvature=1}"])
     )
     assert "r_e" not in bent
+
+
+def test_check_says_which_rods_have_inertia_and_what_the_step_makes_of_it():
+    two = SCENE.replace(
+        "[fluid]",
+        """[filament.other]
+length = 1.0
+nodes = 33
+bending = 1.0
+stretching = 100
+position = [0, 0, 0.5]
+mass = 10.0
+[fluid]""",
+    )
+    text = report(parse_case(two, "s.toml"))
+    modelled, absent = text.split("not modelled:")
+    assert "filament other, 33 nodes: bending, stretching, mass" in modelled
+    assert "inertia of the rods, of rod; inertia of the fluid; walls" in absent
+    assert "filament other oscillates in bending" in text
+    assert "explicit scheme: not with mass" in text
+    assert "other: m/(zeta T), inertia of the rod" in text
+    whole = report(parse_case(two, "s.toml", ["filament.rod.mass=1", "fluid.model=navier-stokes", "fluid.density=1"]))
+    assert "inertia" not in whole.split("not modelled:")[1].split("dimensionless")[0]
+    light = report(parse_case(SCENE, "s.toml", ["fluid.model=navier-stokes", "fluid.density=1"]))
+    assert "inertia of the rods beyond the fluid they displace; walls" in light

@@ -24,7 +24,8 @@ FLOW = ["0.3 + y", "sin(x + t)", "0"]
 FREE = {"model": "stokes", "box": "free", "spacing": 0.1, "slip": 0.01}
 INERTIA = {**GRID, "model": "navier-stokes", "density": 3.0}
 PERIODIC = ["0.3", "sin(2*pi*x/1.6 + t)", "0"]
-# The case's [fluid], and how closely one implicit() satisfies the statement, relative to the move.
+# The case's [fluid], with the mass of its rods, and how closely one implicit() satisfies the
+# statement, relative to the move.
 FLUIDS: dict[str, tuple[dict[str, Any], float]] = {
     "rft": ({"model": "rft"}, 1e-11),
     "rft in a flow": ({"model": "rft", "drag": {"perp": 9.0, "par": 6.0, "spin": 0.1}, "flow": FLOW}, 1e-11),
@@ -56,6 +57,12 @@ FLUIDS: dict[str, tuple[dict[str, Any], float]] = {
     "stirred table, thick": ({**GRID, "method": "table", "rotation": "grid", "flow": FLOW, "thick": True}, 1e-11),
     "navier-stokes, thick": ({**INERTIA, "method": "table", "flow": PERIODIC, "thick": True}, 1e-11),
     "navier-stokes krylov, thick": ({**INERTIA, "method": "krylov", "flow": PERIODIC, "thick": True}, 1e-4),
+    "rft, heavy, in a flow": ({"model": "rft", "flow": FLOW, "mass": 0.7}, 1e-11),
+    "table, heavy and thick": ({**GRID, "method": "table", "flow": FLOW, "thick": True, "mass": "0.3 + s"}, 1e-11),
+    "fft, heavy": ({**GRID, "method": "fft", "mass": 0.7}, 1e-10),
+    "krylov, heavy": ({**GRID, "method": "krylov", "mass": 0.7}, 1e-4),
+    "stirred table, heavy": ({**GRID, "method": "table", "rotation": "grid", "mass": 0.7}, 1e-11),
+    "navier-stokes, heavy": ({**INERTIA, "method": "table", "flow": PERIODIC, "mass": 0.7}, 1e-11),
 }
 
 PLANAR: dict[str, Any] = {
@@ -105,6 +112,8 @@ class Asked(NamedTuple):
 
     fluid: Fluid
     response: Response
+    inertia: np.ndarray  # (n, m) of the nodes, and their velocity v* by which it acts, for steps of 0.5 the one before
+    coasting: np.ndarray
     system: RodSystem
     r: np.ndarray
     e3: np.ndarray
@@ -117,8 +126,10 @@ class Asked(NamedTuple):
 
 def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2) -> Asked:
     """With a past of so many steps, where the fluid keeps one."""
-    if not any("twisting" in rod for rod in rods.values()):
-        fluid = {key: value for key, value in fluid.items() if key != "rotation"}
+    twists = any("twisting" in rod for rod in rods.values())
+    fluid = {key: value for key, value in fluid.items() if twists or key != "rotation"}
+    mass = fluid.pop("mass", None)
+    rods = {name: rod if mass is None else {**rod, "mass": mass} for name, rod in rods.items()}
     stacked = assembly_rods.rods(scene(rods, fluid))
     made = surrounding(fluid_model(scene(rods, fluid)), stacked).fluid
     system, rng = stacked.system, np.random.default_rng(0)
@@ -130,10 +141,40 @@ def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2
     force, inner = system.forces(shape, BETWEEN[1])
     stiffness = system.stiffness(shape, start, inner, BETWEEN[1])
     target = 1e-3 * rng.standard_normal((n, m))
-    for _ in range(steps):
-        made.advance(made.response(shape.r, shape.e3, BETWEEN[0], 0.8 * TAU), y / TAU, force)
+    for k in range(steps):
+        made.advance(made.response(shape.r, shape.e3, BETWEEN[0], 0.8 * TAU), (k + 1) * y / TAU, force)
     response = made.response(shape.r, shape.e3, BETWEEN[1], TAU, 0.5)
-    return Asked(made, response, system, shape.r, shape.e3, force, stiffness, held, y, target)
+    coasting = (1.5**2 * 2 - 0.5**2) / 2 * y / TAU
+    return Asked(
+        made,
+        response,
+        weighed(mass, rods, stacked.s, system),
+        coasting,
+        system,
+        shape.r,
+        shape.e3,
+        force,
+        stiffness,
+        held,
+        y,
+        target,
+    )
+
+
+def weighed(mass: Any, rods: dict[str, dict[str, Any]], s: np.ndarray, system: RodSystem) -> np.ndarray:
+    """Mass and rotary inertia (n, m) of the nodes: that of a round rod of radius 0.05 where it twists."""
+    out = np.zeros((len(s), system.unknowns))
+    per_length = 0.0 * s if mass is None else 0.3 + s if isinstance(mass, str) else np.full(len(s), mass)
+    out[:, :3] = (per_length * system.mesh.volume)[:, None]
+    if system.unknowns == 4:
+        twists = np.repeat(["twisting" in rod for rod in rods.values()], [rod["nodes"] for rod in rods.values()])
+        out[:, 3] = twists * out[:, 0] * 0.05**2 / 2
+    return out
+
+
+def resisted(a: Asked, y: np.ndarray) -> np.ndarray:
+    """The force (n, m) that it takes to give the nodes the velocity of displacements y: m (v - v*)/tau."""
+    return a.inertia * ((y - a.target) / TAU - a.coasting) / TAU
 
 
 def times(stiffness: Stiffness, d: np.ndarray) -> np.ndarray:
@@ -173,7 +214,7 @@ def moved(response: Response, force: np.ndarray, target: np.ndarray) -> np.ndarr
 
 
 EACH_SCENE = pytest.mark.parametrize("name", SCENES)
-THIN = {name: fluid for name, (fluid, _) in FLUIDS.items() if "thick" not in fluid}
+THIN = {name: fluid for name, (fluid, _) in FLUIDS.items() if not {"thick", "mass"} & set(fluid)}
 EACH_FLUID = pytest.mark.parametrize(("fluid", "tolerance"), FLUIDS.values(), ids=FLUIDS)
 
 
@@ -186,10 +227,12 @@ def test_forced(fluid, tolerance, name):
     assert np.array_equal(answer.move.ravel()[a.held.at], a.held.value)
     assert not elsewhere(answer.reaction, a.held).any()
     assert a.held.at.size == 0 or np.all(answer.reaction.ravel()[a.held.at] != 0)
-    scale = np.abs(answer.force).max()
-    assert np.abs(answer.force - (a.force + answer.reaction)).max() < 1e-13 * scale
-    statement = moved(a.response, answer.force, a.target)
-    exact = tolerance if fluid.get("thick") else 1e-12  # what nodes feel of their own velocity is solved for
+    scale, inertia = np.abs(answer.force).max(), resisted(a, answer.move)
+    assert np.abs(answer.force - (a.force + answer.reaction - inertia)).max() < 1e-12 * max(
+        scale, np.abs(inertia).max()
+    )
+    statement = moved(a.response, answer.force + inertia, a.target)
+    exact = 1e-12 if fluid in THIN.values() else tolerance  # what nodes feel of their own velocity is solved for
     assert np.abs(answer.move - statement).max() < exact * np.abs(answer.move - a.target).max()
     assert np.array_equal(a.force, before[0])
     assert np.array_equal(a.target, before[1])
@@ -216,10 +259,10 @@ def assert_implicit(a: Asked, tolerance: float) -> None:
     assert np.abs(missed).max(initial=0.0) < 1e-14 * np.abs(answer.move).max()  # out of a linear solve: to round-off
     assert not elsewhere(answer.reaction, a.held).any()
     assert a.held.at.size == 0 or np.all(answer.reaction.ravel()[a.held.at] != 0)
-    bent = times(a.stiffness, answer.move)
+    bent, inertia = times(a.stiffness, answer.move), resisted(a, new)
     scale = np.abs(bent).max()
-    assert np.abs(answer.force - (a.force + bent + answer.reaction)).max() < 1e-12 * scale
-    statement = moved(a.response, answer.force, a.target)
+    assert np.abs(answer.force - (a.force + bent + answer.reaction - inertia)).max() < 1e-12 * scale
+    statement = moved(a.response, answer.force + inertia, a.target)
     assert np.abs(new - statement).max() < tolerance * np.abs(answer.move).max()
     for now, then in zip((a.force, a.target, a.y), before, strict=True):
         assert np.array_equal(now, then)
@@ -230,8 +273,8 @@ def assert_implicit(a: Asked, tolerance: float) -> None:
 def test_nothing_pushes_a_fluid_with_a_free_rod_in_it(fluid, tolerance, name):
     a = asked(fluid, SCENES[name])
     implicit = a.response.implicit(a.force, a.stiffness.copy(), a.held, a.y, a.target)
-    for answer in (a.response.forced(a.force, a.held, a.target), implicit):
-        net = answer.force[:, :3].sum(axis=0)
+    for answer, y in ((a.response.forced(a.force, a.held, a.target), 0.0), (implicit, a.y)):
+        net = (answer.force + resisted(a, y + answer.move))[:, :3].sum(axis=0)
         assert np.abs(net).max() < 1e-12 * np.abs(answer.force).max()
         assert not answer.reaction.any()
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.rests import CLAMPED, at_rest, spun, straight
 
+from ibfil.errors import CaseError
 from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation.at_rest import SceneAtRest
 from ibfil.timestepping.base import State
@@ -23,6 +24,7 @@ FLOW = {"flow": ["-3*x", "0", "3*z"]}
 FLUIDS: dict[str, dict[str, Any]] = {
     "rft": {"model": "rft"},
     "rft in a flow": {"model": "rft", **FLOW},
+    "thick in a flow": {"model": "rft", **FLOW, "thick": {"aspect": 6.0}},
     "table": {**GRID, "method": "table"},
     "table in a flow": {**GRID, "method": "table", **FLOW},
     "fft": {**GRID, "method": "fft"},
@@ -188,3 +190,8 @@ def test_a_steady_fluid_keeps_held_ends_at_rest():
     alone = response.forced(motion.force + held.reaction, free, np.zeros(motion.shape))
     assert np.abs(held.move).max() < 1e-6
     assert np.abs(alone.move).max() < 1e-6
+
+
+def test_rods_with_mass_are_refused():
+    with pytest.raises(CaseError, match=r"filament.rod.mass: found a mass; allowed: none; rests are the same"):
+        at_rest(straight(9, mass=1.0))

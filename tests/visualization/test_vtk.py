@@ -182,7 +182,10 @@ def test_q_is_positive_in_a_vortex_and_negative_in_strain():
     x, y, z = np.meshgrid(*(np.linspace(0, 1, n) for n in (5, 6, 7)), indexing="ij")
     spacing = np.array([1 / 4, 1 / 5, 1 / 6])
     for u, q in (((-2 * y, 2 * x, 0 * z), 4.0), ((3 * x, -3 * y, 0 * z), -9.0), ((5 * y, 0 * x, 0 * z), 0.0)):
-        np.testing.assert_allclose(meshes.q_criterion(np.stack(u, axis=-1), spacing), q, atol=1e-12)
+        velocity = np.stack(u, axis=-1)
+        np.testing.assert_allclose(meshes.q_criterion(velocity, spacing), q, atol=1e-12)
+        np.testing.assert_allclose(meshes.q_criterion(velocity[:, :, 3:4], spacing), q, atol=1e-12)  # a plane flow
+        np.testing.assert_allclose(meshes.q_criterion(velocity[:2, :, :2], spacing), q, atol=1e-12)
 
 
 def test_q_is_in_the_collection(collection):

@@ -140,7 +140,8 @@ class FluidModel(ABC):
     def absent(self) -> list[str]:
         """The effects it leaves out, a line each."""
 
-    inertia_absent = "inertia of rod and fluid"
+    fluid_inertia_absent: str = "inertia of the fluid"
+    rod_inertia = "inertia of the rods"
 
     def size(self) -> list[str]:
         """Lines about its grid and what that makes of a rod."""

@@ -55,7 +55,7 @@ def spun_radius(filament: Filament, widest: float) -> float:
 
 def of_nodes(case: Case, name: str, groups: Mapping[str, float]) -> list[str]:
     """Nodes too near or too far for the grid, and rods and waves too small for it."""
-    key, out, apart, thick = f"filament.{name}", [], groups["ds/h"], groups["a/L"]
+    key, out, apart, thick = f"filament.{name}", [], groups["ds/h"], groups.get("a/L", 0.0)
     if apart < LOCKING_SPACING and case.fluid.slip == 0:
         out.append(
             f"{key}: nodes are {apart:.2g} cells apart and fluid.slip = 0: below {LOCKING_SPACING} a nearly "
@@ -120,6 +120,7 @@ def of_images(grid: Grid, scene: Scene, name: str) -> list[str]:
     """A filament that, as it begins, reaches from one face of the box to the other."""
     box = np.asarray(grid.box)
     spans = np.ptp(scene.configuration.r[scene.nodes(name)], axis=0)
+    spans[grid.cells == 1] = 0.0  # told otherwise
     axis = int(np.argmax(spans / box))
     if spans[axis] <= box[axis]:
         return []
@@ -154,13 +155,13 @@ def of_net_force(grid: Grid, scene: Scene, cure: Callable[[float], str]) -> list
     ]
 
 
-def of_flow(grid: Grid, flow: Flow | None) -> list[str]:
-    """A background flow on a periodic box that differs from face to face."""
+def of_flow(grid: Grid, flow: Flow | None, thin: int | None = None) -> list[str]:
+    """A background flow on a periodic box that differs from face to face, those across the axis ``thin`` excepted."""
     if flow is None:
         return []
     places = np.random.default_rng(0).uniform(-0.5, 0.5, (64, 3)) * grid.box
-    here = flow(places, 0.0)
-    jump = max(float(np.max(np.abs(flow(places + side, 0.0) - here))) for side in np.diag(grid.box))
+    here, sides = flow(places, 0.0), np.delete(np.diag(grid.box), [] if thin is None else [thin], axis=0)
+    jump = max(float(np.max(np.abs(flow(places + side, 0.0) - here))) for side in sides)
     largest = max(float(np.max(np.abs(here))), 1e-300)
     if jump <= FLOW_JUMP * largest:
         return []

@@ -41,7 +41,8 @@ def crossing(reynolds: float) -> float:
 class NavierStokesModel(GridModel):
     """Navier-Stokes flow on a periodic grid, from rest: the statement of Stokes flow with a history."""
 
-    inertia_absent = "inertia of the rod beyond the fluid it displaces"
+    fluid_inertia_absent = ""
+    rod_inertia = "inertia of the rods beyond the fluid they displace"
     steps_known = False
 
     @property

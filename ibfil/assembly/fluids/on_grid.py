@@ -10,10 +10,11 @@ import numpy as np
 
 from .. import costs
 from .. import grid as grids
-from . import grid_warnings
+from . import grid_warnings, sheet
 from .immersed import ImmersedModel
 
 if TYPE_CHECKING:
+    from ...case.filament import Filament
     from ...fluids.base import Fluid
     from ...fluids.output import FluidOutput
     from ...fluids.spaces.periodic import PeriodicSpace
@@ -105,18 +106,41 @@ class GridModel(ImmersedModel):
 
     def size(self) -> list[str]:
         """The grid, and how thick rods and nodes are on it."""
-        return [f"grid {' x '.join(str(n) for n in self.grid.cells)}, h = {self.grid.spacing:.4g}", *super().size()]
+        axis, h = self.case.fluid.thin_axis, self.grid.spacing
+        more = super().size() if axis is None else sheet.size(axis, h)
+        return [f"grid {' x '.join(str(n) for n in self.grid.cells)}, h = {h:.4g}", *more]
+
+    def modelled(self) -> list[str]:
+        """Whether the flow is plane; and what every immersed fluid has."""
+        axis = self.case.fluid.thin_axis
+        return [*([] if axis is None else [sheet.modelled(axis)]), *super().modelled()]
+
+    def drag(self, filament: Filament) -> float:
+        """That of a waving sheet where the flow is plane."""
+        if self.case.fluid.thin_axis is None:
+            return super().drag(filament)
+        return sheet.drag(self.case.fluid.viscosity, self.grid.spacing, filament.length)
+
+    def groups(self, filament: Filament, rate: float) -> dict[str, float]:
+        """Nodes, radii and waves in units of cells; a sheet has no radius."""
+        found = super().groups(filament, rate)
+        if self.case.fluid.thin_axis is not None:
+            del found["a/L"]
+        return found
 
     def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
-        """Of every immersed filament; and rods longer than the box."""
-        return [*super().warnings_of(scene, name, groups), *grid_warnings.of_images(self.grid, scene, name)]
+        """Of every immersed filament; rods longer than the box, sheets that leave their plane."""
+        axis, out = self.case.fluid.thin_axis, super().warnings_of(scene, name, groups)
+        if axis is not None:
+            out = [*out, *sheet.leaves_plane(scene, self.case.filaments[name], name, axis)]
+        return [*out, *grid_warnings.of_images(self.grid, scene, name)]
 
     def warnings(self, scene: Scene) -> list[str]:
-        """A net force that a back pressure carries, a flow that is not periodic."""
-        return [
-            *grid_warnings.of_net_force(self.grid, scene, self.of_images),
-            *grid_warnings.of_flow(self.grid, self.flow),
-        ]
+        """A net force that a back pressure carries, a flow that is not periodic, or not plane."""
+        axis, out = self.case.fluid.thin_axis, grid_warnings.of_net_force(self.grid, scene, self.of_images)
+        if axis is not None:
+            return [*out, *grid_warnings.of_flow(self.grid, self.flow, axis), *sheet.of_flow(self.flow, axis, self.box)]
+        return [*out, *grid_warnings.of_flow(self.grid, self.flow)]
 
     # -- pictures and recorded runs
 

@@ -84,6 +84,16 @@ class ResistiveForceModel(FluidModel):
                 out["matched zeta_r/eta"] = matched.spin
         return out
 
+    def warnings(self, scene: Scene) -> list[str]:
+        """Drag of rods in a case whose grid makes them sheets."""
+        axis = self.case.fluid.thin_axis
+        if axis is None:
+            return []
+        return [
+            f"fluid.cells: one cell along {'xyz'[axis]} makes filaments sheets on a grid; the drag here is that of "
+            "rods: the two are not one scene"
+        ]
+
     def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
         """Drag calibrated on a grid that cannot tell it to two digits."""
         scatter = groups.get("matched scatter", 0.0)

@@ -46,6 +46,8 @@ class StokesModel(GridModel):
 
     def of_images(self, force: float) -> str:
         """Hasimoto's 2.837297 F/(6 pi eta L) by which the images of a cubic box of side L slow what is pulled."""
+        if self.case.fluid.thin_axis is not None:
+            return super().of_images(force)
         side = float(np.prod(self.grid.box)) ** (1 / 3)
         slower = 2.837297 * force / (6 * np.pi * self.case.fluid.viscosity * side)
         return f'with its images this slows the rods by about {slower:.3g}; fluid.box = "free" has neither'

@@ -11,6 +11,7 @@ from ..faults import Fault, shown
 from ..filament import End, Filament, TwoWell, copy_name, single
 from ..schema import Scene
 from ..shape import Circle, Helix, RunShape
+from .mass import check_mass
 from .planar import check_planar
 
 Axis = tuple[float, float, float]
@@ -24,6 +25,7 @@ def check_filament(name: str, filament: Filament, case: Scene) -> Iterator[Fault
         yield Fault(key, f"the name of a copy of {stem}", f"another name; copies are called {copy_name(stem, 0)} ...")
     yield from _numbers(key, filament)
     yield from _moduli(key, filament)
+    yield from check_mass(key, filament, case)
     yield from _law(f"{key}.law", filament)
     yield from _place(key, filament)
     yield from _shape(key, filament)
@@ -57,9 +59,10 @@ def _spacing(key: str, spacing: Expression, nodes: int) -> Iterator[Fault]:
 
 
 def _moduli(key: str, filament: Filament) -> Iterator[Fault]:
-    """Moduli and radius are positive, and what shapes the rod at t = 0 has a value, all along."""
+    """Moduli, radius and mass are positive, and what shapes the rod at t = 0 has a value, all along."""
     reads = (f"{key}.length",)
-    positive = {"stretching": filament.stretching, "twisting": filament.twisting, "radius": filament.radius}
+    optional = ("twisting", "radius", "mass", "rotary_inertia")
+    positive = {"stretching": filament.stretching} | {name: getattr(filament, name) for name in optional}
     one = filament.bending[0] == filament.bending[1]
     positive |= {"bending": filament.bending[0]} if one else dict(_numbered("bending", filament.bending))
     for name, expression in positive.items():
@@ -69,6 +72,7 @@ def _moduli(key: str, filament: Filament) -> Iterator[Fault]:
             yield Fault(f"{key}.{name}", what, "> 0 along the whole filament", reads)
     finite = {"twist_rate": filament.twist_rate, "shape.twist": filament.shape.twist}
     finite |= _numbered("curvature", filament.curvature) | _numbered("shape.perturb", filament.shape.perturb)
+    finite |= _numbered("velocity", filament.velocity or ())
     for name, expression in finite.items():
         found = _least(expression, filament.length)
         if isinstance(found, str):

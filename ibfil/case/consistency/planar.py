@@ -83,6 +83,8 @@ def _own_leaving(filament: Filament, normal: Vector, axis: int) -> Iterator[str]
         yield "shape.kind"
     if _along(shape.perturb, normal, filament):
         yield "shape.perturb"
+    if filament.velocity is not None and _along(filament.velocity, normal, filament):
+        yield "velocity"
     for side, end in (("start", filament.start), ("finish", filament.finish)):
         yield from (f"{side}.{name}" for name in _end_leaving(end, filament, normal, axis))
     if filament.loads is not None:

@@ -15,6 +15,7 @@ from ..filament import copy_name, single
 from ..fluid import Coefficients, Fluid, Matched
 from ..schema import Observe, Scene
 from .filament import check_filament
+from .sheet import check_sheet
 from .size import check_size
 from .space import check_space
 from .thickness import check_thickness
@@ -37,6 +38,7 @@ def check(case: Scene) -> Iterator[Fault]:
         _drag,
         _matched,
         check_thickness,
+        check_sheet,
         _thermal,
         _time,
         _output,

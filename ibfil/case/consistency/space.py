@@ -65,8 +65,8 @@ def _periodic(fluid: Fluid) -> Iterator[Fault]:
         found = f"{shown(fluid.cells)}, which makes h = " + ", ".join(f"{h:.6g}" for h in spacing)
         such = _nearest(fluid.sides, fluid.cells)
         yield Fault("fluid.cells", found, f"one h on all axes, such as {such}", ("fluid.box",))
-    elif min(fluid.cells) < SUPPORT[fluid.kernel]:
-        allowed = f"at least {SUPPORT[fluid.kernel]} on each axis, the width of {fluid.kernel}"
+    elif any(1 < count < SUPPORT[fluid.kernel] for count in fluid.cells):
+        allowed = f"at least {SUPPORT[fluid.kernel]} on each axis, the width of {fluid.kernel}, or 1 for a plane flow"
         yield Fault("fluid.cells", shown(fluid.cells), allowed, ("fluid.kernel",))
 
 

@@ -85,12 +85,13 @@ class _Response:
 
     def _of_rods(self, answer: Solution, y: np.ndarray, target: np.ndarray) -> Solution:
         """The solution with the forces of the rods on the fluid, without those that the fluid does to them."""
-        return answer._replace(force=answer.force - self.from_fluid((y + answer.move - target) / self.tau))
+        done = self.from_fluid((y + answer.move - target) / self.tau)
+        return answer if done is None else answer._replace(force=answer.force - done)
 
-    def from_fluid(self, u: np.ndarray) -> np.ndarray:
-        """The forces (n, m) on nodes with velocities u (n, m) that the fluid inside does not know it does."""
-        parts = (one.from_fluid(u) for one in self._frozen)
-        return sum((part for part in parts if part is not None), np.zeros_like(u))
+    def from_fluid(self, u: np.ndarray) -> np.ndarray | None:
+        """The forces (n, m) on nodes with velocities u (n, m) that the fluid inside does not know it does, if any."""
+        parts = [part for part in (one.from_fluid(u) for one in self._frozen) if part is not None]
+        return sum(parts[1:], parts[0]) if parts else None
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements of given forces of the rods."""
@@ -122,7 +123,8 @@ class Wrapped:
     def advance(self, response: Response, velocity: np.ndarray, force: np.ndarray) -> None:
         """Tells the fluid of all that pushed it, and the forces of the velocity."""
         assert isinstance(response, _Response)
-        self.inner.advance(response.inner, velocity, force + response.from_fluid(velocity))
+        done = response.from_fluid(velocity)
+        self.inner.advance(response.inner, velocity, force if done is None else force + done)
         for own in self.forces:
             own.advance(velocity)
 

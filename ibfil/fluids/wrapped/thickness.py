@@ -59,9 +59,8 @@ def _add(stiff, edge, strained, inverse, constant, matrix):
 @njit(cache=True)
 def _pairs(stiff, edge, strained, u):
     """q (n, 3) of each segment for velocities u (n, m)."""
-    n = len(u)
-    out = np.zeros((n, 3))
-    for i in range(n - 1):
+    out = np.zeros((len(u), 3))
+    for i in range(len(u) - 1):
         if stiff[i] == 0.0:
             continue
         length = np.sqrt(edge[i, 0] ** 2 + edge[i, 1] ** 2 + edge[i, 2] ** 2)
@@ -71,6 +70,17 @@ def _pairs(stiff, edge, strained, u):
             along += out[i, a] * edge[i, a] / length**2
         for a in range(3):
             out[i, a] -= along * edge[i, a]
+    return out
+
+
+@njit(cache=True)
+def _forces(stiff, edge, strained, u):
+    """The forces (n, m) of the pairs: q on the node behind a segment, -q on the one before."""
+    pairs, out = _pairs(stiff, edge, strained, u), np.zeros(u.shape)
+    for i in range(len(u) - 1):
+        for a in range(3):
+            out[i, a] -= pairs[i, a]
+            out[i + 1, a] += pairs[i, a]
     return out
 
 
@@ -85,10 +95,8 @@ class Couple:
         _add(self.stiff, self.edge, self.strained, self._inverse, constant, matrix)
 
     def from_fluid(self, u: np.ndarray) -> np.ndarray:
-        """All of it: q on the node behind a segment, -q on the one before."""
-        pairs, out = _pairs(self.stiff, self.edge, self.strained, u), np.zeros_like(u)
-        out[1:, :3] += pairs[:-1]
-        out[:, :3] -= pairs
+        """All of it."""
+        out: np.ndarray = _forces(self.stiff, self.edge, self.strained, u)
         return out
 
     def dissipation(self, u: np.ndarray) -> float:
