@@ -10,6 +10,7 @@ import pytest
 from ibfil.fluids.base import Memoryless, Solution
 from ibfil.fluids.wrapped.fluid import Wrapped
 from ibfil.linalg.constraints import Prescribed
+from ibfil.linalg.stiffness import Stiffness, no_pairs
 
 N, M = 5, 3
 FREE = Prescribed(np.zeros(0, np.int64), np.zeros(0))
@@ -29,7 +30,7 @@ class Inside(Memoryless):
         self.asked.append(stiffness)
         move, pushed = 0.5 * force, force.copy()
         if not self.keeps:
-            stiffness[:] = np.nan
+            stiffness.band[:] = np.nan
         return Solution(move, pushed, ZERO)
 
     def advance(self, response: Inside, velocity: np.ndarray, force: np.ndarray) -> None:
@@ -95,7 +96,7 @@ def test_the_force_of_an_answer_is_that_of_the_rods(by_fluid):
 
 @pytest.mark.parametrize("keeps", [True, False])
 def test_one_matrix_for_one_stiffness_where_the_fluid_keeps_factors(keeps):
-    inside, stiffness = Inside(keeps), np.ones((N, M, 3 * M))
+    inside, stiffness = Inside(keeps), Stiffness(np.ones((N, M, 3 * M)), no_pairs(M))
     response = Wrapped(inside, [Pull(True)], 1).response(ZERO, ZERO, 0.0, 0.1)
     for _ in range(2):
         response.implicit(ZERO, stiffness if keeps else stiffness.copy(), FREE, ZERO, ZERO)
@@ -103,9 +104,9 @@ def test_one_matrix_for_one_stiffness_where_the_fluid_keeps_factors(keeps):
     first, alone, second, again = inside.asked
     assert (first is second) == (alone is again) == keeps
     if keeps:
-        assert first[:, 0, M] == pytest.approx(1.0 - 30.0)
-        assert alone[:, 0, M] == pytest.approx(-30.0)
-        assert np.array_equal(stiffness, np.ones_like(stiffness))
+        assert first.band[:, 0, M] == pytest.approx(1.0 - 30.0)
+        assert alone.band[:, 0, M] == pytest.approx(-30.0)
+        assert np.all(stiffness.band == 1.0)
         response.forced(ZERO, Prescribed(np.array([0]), np.zeros(1)), ZERO)  # others are held: factors of its own
         assert inside.asked[-1] is not alone
 

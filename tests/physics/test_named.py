@@ -125,7 +125,7 @@ def test_too_many_steps():
 def test_locked():
     (line,) = warned("filament.rod.nodes=41", "fluid.slip=0")
     assert re.match(rf"filament\.rod: nodes are {NUMBER} cells apart and fluid\.slip = 0: below 0\.8 .* locks", line)
-    assert "set fluid.slip = 0.01, or take fewer nodes or more cells" in line
+    assert "set fluid.slip = 0.01, or take fewer nodes or more fluid.cells" in line
     assert warned("filament.rod.nodes=41") == []
     assert warned("filament.rod.nodes=11", "fluid.slip=0", "filament.rod.shape={kind='straight'}") == []
 

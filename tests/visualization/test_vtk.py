@@ -173,7 +173,7 @@ def test_without_a_box_images_are_refused(tmp_path):
 
     run(case("", "time.end=0.1"), tmp_path / "rft.h5")
     for more in ({"wrap": True}, {"images": 1}):
-        with pytest.raises(CaseError, match="rft has no periodic box"):
+        with pytest.raises(CaseError, match="a run in a periodic box, which rft and free space have not"):
             vtk_files.write_vtk(tmp_path / "rft.h5", **more)
 
 
