@@ -180,9 +180,9 @@ def _steps(simulation: Simulation) -> list[str]:
         lines += _automatic(simulation)
     if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
         lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
-    limit = (
-        f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)" if not case.heavy else ""
-    )
+    limit = "not with mass"
+    if not case.heavy:
+        limit = f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)"
     return [
         *lines,
         f"explicit scheme: {limit}",

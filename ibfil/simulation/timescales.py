@@ -49,8 +49,8 @@ def load_rate(model: Model, drivers: Drivers) -> float:
         velocity = None if flow is None else flow(rods.start.r, time)
         for filament, where in zip(rods.filaments, rods.nodes, strict=True):
             total = float(size[where].sum())
-            if total > 0:
-                rate = max(rate, 1 / max(drag[id(filament)] / total, (mass[id(filament)] / total) ** 0.5))
+            heavy = (total / mass[id(filament)]) ** 0.5 if mass[id(filament)] else np.inf
+            rate = max(rate, min(total / drag[id(filament)], heavy))
             if velocity is not None:
                 rate = max(rate, float(np.linalg.norm(np.ptp(velocity[where], axis=0))) / filament.length)
     return 2 * np.pi * rate

@@ -12,7 +12,6 @@ import pytest
 from helpers.scenes import run, scene, slopes
 
 from ibfil.check.dimensionless import oscillations
-from ibfil.linalg import banded
 from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation import timescales
 from ibfil.simulation.simulation import Simulation
@@ -55,7 +54,7 @@ def across(simulation: Simulation) -> tuple[complex, np.ndarray]:
     """
     system, start = simulation.system, simulation.start
     _, inner = system.forces(start, 0.0)
-    whole = banded.dense(system.stiffness(start, start, inner, 0.0))[:, 1, :, 1]
+    whole = system.stiffness(start, start, inner, 0.0).dense()[:, 1, :, 1]
     free = ~np.isin(np.arange(len(start.r)), system.ends.index // system.unknowns)
     values, modes = np.linalg.eig(-whole[np.ix_(free, free)] / system.mesh.volume[free, None])
     bending = np.argsort(np.where(values.real > 1.0, values.real, np.inf))[0]  # not moves as a rigid body
