@@ -88,9 +88,14 @@ def seconds_a_step(
     return _by_method(case, rods, parts, local, {"fft": whole, "pruned": pruned})
 
 
-def of_methods(case: Case, rods: Sequence[int], parts: int, evaluations: dict[str, float]) -> dict[str, float]:
-    """The same of a fluid without a history, given the seconds of an evaluation by each kind of transforms."""
-    return _by_method(case, rods, parts, of_rods(case, sum(rods)), evaluations)
+def of_methods(
+    case: Case, rods: Sequence[int], parts: int, evaluations: dict[str, float], pair: float = 1.0
+) -> dict[str, float]:
+    """The same of a fluid without a history, given the seconds of an evaluation by each kind of transforms.
+
+    ``pair`` is what a pair of nodes costs, over what it does in the periodic table.
+    """
+    return _by_method(case, rods, parts, of_rods(case, sum(rods)), evaluations, pair)
 
 
 def _table(nodes: int, parts: int) -> float:
@@ -99,20 +104,20 @@ def _table(nodes: int, parts: int) -> float:
 
 
 def _by_method(
-    case: Case, rods: Sequence[int], parts: int, local: float, evaluations: dict[str, float]
+    case: Case, rods: Sequence[int], parts: int, local: float, evaluations: dict[str, float], pair: float = 1.0
 ) -> dict[str, float]:
     """Seconds by the table, by the transforms of ``evaluations`` (seconds of one each), and by Krylov on the cheapest.
 
     ``local`` is what a step takes whatever answers to the forces.
     """
     rounds, nodes, cheapest = _ROUNDS[case.time.scheme], sum(rods), min(evaluations.values())
-    build = _table(nodes, parts)
+    build = pair * _table(nodes, parts)
     if case.time.explicit:
         by_transforms = {name: local + one for name, one in evaluations.items()}
         return {"table": local + build, **by_transforms, "krylov": local + cheapest}
     # Transforms have the exact matrix of all nodes for a preconditioner, Krylov that of each rod.
     exact = local + build + rounds * solved(nodes, parts) if dense_bytes(nodes, parts) < _LARGEST else np.inf
-    made = sum(factored(k, parts) for k in rods)
+    made = sum(pair * _table(k, parts) + solved(k, parts) for k in rods)
     by_transforms = {name: exact + 4 * rounds * one for name, one in evaluations.items()}
     return {"table": exact, **by_transforms, "krylov": local + _PRODUCTS * rounds * cheapest + made}
 

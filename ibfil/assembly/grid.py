@@ -95,7 +95,7 @@ def spacing(case: Case) -> float:
 def window(case: Case) -> Lattice | None:
     """The points of free space at which fields are written; None where the case has no window.
 
-    The window is rounded up to numbers of cells that FFTs like, and has a point at its middle.
+    The window is rounded up to numbers of cells that FFTs like, and has a point at its middle, or stands on the wall.
     """
     from ..grid.periodic_grid import Lattice, smooth
 
@@ -104,8 +104,11 @@ def window(case: Case) -> Lattice | None:
     h = spacing(case)
     least = [max(1, int(np.ceil(side / h * (1 - 1e-12)))) for side in case.output.window]
     counts = np.array([next(n for n in range(k, 2 * k + 1) if smooth(n)) for k in least])
-    middle = np.rint(np.array(case.output.window_at or (0.0, 0.0, 0.0)) / h).astype(int)
-    return Lattice(counts.tolist(), h, (middle - counts // 2) * h)
+    at = case.output.window_at or (0.0, 0.0, 0.0)
+    first = np.rint(np.array(at) / h).astype(int) - counts // 2
+    if case.fluid.wall is not None and (case.output.window_at is None or first[2] < 0):
+        first[2] = 0  # it stands on the wall
+    return Lattice(counts.tolist(), h, first * h)
 
 
 def twist_radius(case: Case) -> float:

@@ -95,6 +95,9 @@ class Fluid(Table):
         None, description="hydrodynamic line radius that chooses the cells, or the spacing of free space"
     )
     spacing: Positive | None = Field(None, description="h of the grid in free space; or thickness")
+    wall: Literal["no-slip", "free-slip"] | None = Field(
+        None, description="the plane z = 0, fluid above it; with box = free"
+    )
     kernel: Literal["roma3", "peskin4", "bspline4", "bspline6", "bkp6", "es4", "es5", "es6"] = Field(
         "peskin4", description="delta function"
     )
@@ -115,17 +118,25 @@ class Fluid(Table):
     @property
     def kind(self) -> str:
         """The name of its model: the word, and of Stokes flow the space that it fills."""
-        return "free" if self.model == "stokes" and self.free else self.model
+        if self.model != "stokes" or not self.free:
+            return self.model
+        return "free" if self.wall is None else "wall"
 
     @property
     def words(self) -> str:
         """Its name where a run is told of."""
-        return f"{self.model} in free space" if self.on_grid and self.free else self.model
+        where = {"free": " in free space", "wall": f" above a {self.wall} wall"}
+        return self.model + where.get(self.kind, "")
 
     @property
     def free(self) -> bool:
         """Whether its space has no bounds."""
         return self.box == "free"
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the fluid above the wall sticks to it."""
+        return self.wall == "no-slip"
 
     @property
     def sides(self) -> tuple[float, float, float] | None:

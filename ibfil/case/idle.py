@@ -18,7 +18,8 @@ def idle_keys(case: Case) -> list[str]:
     idle: dict[str, list[str]] = {"fluid": [] if fluid.model == "navier-stokes" else ["density"], "output": []}
     if fluid.model == "rft":
         grid = [] if isinstance(fluid.drag, Matched) else ["box", "cells", "thickness", "spacing", "kernel", "slip"]
-        idle["fluid"] += [*grid, "method", "precision"]
+        wall = [] if any(entry.pumps for entry in case.observe.values()) else ["wall"]
+        idle["fluid"] += [*grid, *wall, "method", "precision"]
         spins = isinstance(fluid.drag, Matched) and fluid.rotation == "grid"
         idle["fluid"] += [] if spins and any(f.twisting for f in case.filaments.values()) else ["rotation"]
         idle["output"] += ["grid_every", "fields", "grid_stride", "window", "window_at", "probes"]

@@ -127,6 +127,7 @@ class Observe(Table):
         "torque",
         "power",
         "dissipation",
+        "flux",
         "efficiency",
     ] = Field(description="what is taken; each is explained at the end of `ibfil schema`", examples=["speed"])
     filament: str = Field("", description="name of a filament; needed where there are several")
@@ -141,6 +142,16 @@ class Observe(Table):
     summary: Literal["last", "mean", "max", "min", "median"] = Field(
         "last", description="over `over`: the number in the summary and in [expect]"
     )
+
+    @property
+    def together(self) -> bool:
+        """Whether it is of all filaments together."""
+        return self.kind in ("dissipation", "flux")
+
+    @property
+    def pumps(self) -> bool:
+        """Whether it is a flux along a wall."""
+        return self.kind == "flux"
 
     @property
     def reduces(self) -> bool:
@@ -174,7 +185,9 @@ class Output(Table):
     )
     grid_stride: Count = Field(1, description="every so many cells of a field")
     window: Sizes | None = Field(None, description="sides of the part of free space whose fields are written")
-    window_at: Vector | None = Field(None, description="its middle; the origin by default")
+    window_at: Vector | None = Field(
+        None, description="its middle; the origin by default, or such that it stands on the wall"
+    )
     probes: Annotated[tuple[Vector, ...], Listed()] = Field((), description="points whose velocity is written")
     checkpoint_every: Positive = Field(60.0, description="wall seconds between checkpoints")
 

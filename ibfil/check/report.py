@@ -114,7 +114,8 @@ def absent(case: Case) -> list[str]:
     light = [name for name, filament in case.filaments.items() if filament.mass is None]
     of = "" if len(light) == len(case.filaments) else f", of {', '.join(light)}"
     inertia = [fluid.rod_inertia + of] * bool(light) + [fluid.fluid_inertia_absent] * bool(fluid.fluid_inertia_absent)
-    out.append("; ".join([*inertia, "walls", "heads", "closed rods"]))
+    walls = ["walls"] * (fluid.wall is None)
+    out.append("; ".join([*inertia, *walls, "heads", "closed rods"]))
     return out
 
 

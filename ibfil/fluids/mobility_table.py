@@ -63,7 +63,7 @@ def octant(response: np.ndarray, points: int, number: type = np.float64) -> Octa
 
 
 @njit(cache=True, inline="always")
-def _plane_sums(table, corner, c, acc, unit, points):
+def plane_sums(table, corner, c, acc, unit, points):
     """The sums over x and y into ``acc`` (k terms,).
 
     Written so that the compiler takes neighbours in ``acc`` together. Up to four points it unrolls both sums, and keeps
@@ -121,7 +121,7 @@ def sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points):
             corner, sign = (corner[0], at, 0), (sign[0], s, 1.0)
         else:
             corner, sign = (corner[0], corner[1], parts * at), (sign[0], sign[1], s)
-    _plane_sums(octant.values, corner, c, acc, unit, points)
+    plane_sums(octant.values, corner, c, acc, unit, points)
     for x in range(parts):
         total = 0.0
         for k in range(2 * p - 1):

@@ -35,15 +35,17 @@ def symbols(parts: int, cells: tuple[int, int, int]) -> np.ndarray:
     out = response(parts, tuple(n // 2 + 1 for n in cells))
     for part, odd in zip(out, ODD, strict=False):
         for axis in range(3):
-            if axis in odd:
-                inner = [slice(1, -1) if a == axis else slice(None) for a in range(3)]
-                edge = [slice(None, None, part.shape[axis] - 1) if a == axis else slice(None) for a in range(3)]
-                part[tuple(inner)] = dst(part[tuple(inner)], type=1, axis=axis)
-                part[tuple(edge)] = 0.0
-            else:
-                part[:] = dct(part, type=1, axis=axis)
+            part[:] = sines(part, axis) if axis in odd else dct(part, type=1, axis=axis)
         if len(odd) == 2:
             part *= -1.0
+    return out
+
+
+def sines(values: np.ndarray, axis: int) -> np.ndarray:
+    """The transform of what is odd along an axis of three, without its -i; zero where that begins and ends."""
+    out = np.zeros_like(values)
+    inner = tuple(slice(1, -1) if a == axis else slice(None) for a in range(3))
+    out[inner] = dst(values[inner], type=1, axis=axis)
     return out
 
 

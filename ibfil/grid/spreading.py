@@ -15,6 +15,14 @@ class Stencil(NamedTuple):
     weights: np.ndarray
 
 
+def mirrored(stencil: Stencil) -> Stencil:
+    """Stencils of the images of nodes in the plane z = 0."""
+    base, weights = stencil.base.copy(), stencil.weights.copy()
+    base[:, 2] = 1 - weights.shape[2] - base[:, 2]
+    weights[:, 2] = weights[:, 2, ::-1]
+    return Stencil(base, weights)
+
+
 @njit(cache=True)
 def spread(base, weights, force, field):
     """Adds force (n, 3) to field (3, nx, ny, nz) with the weights; divide by the cell's volume for a density."""

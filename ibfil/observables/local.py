@@ -356,21 +356,6 @@ class Power(Windowed, kind="power"):
         return float(np.sum(filament.power[self.inside]))
 
 
-class Dissipation(ObservableBase, kind="dissipation"):
-    """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
-
-    On a grid it costs an evaluation of the fluid at each output.
-    """
-
-    keys: ClassVar[tuple[str, ...]] = SUMMARY
-    dimension = "force length/time"
-    description = "power turned into heat by the fluid, filaments together, one"
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        return float(snapshot.diagnostics["dissipation"])
-
-
 def _distance_across(points: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
     """Distance (m,) of points (m, 3) from the line through the origin along ``axis``."""
     assert axis is not None  # these kinds have a default

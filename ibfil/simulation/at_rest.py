@@ -55,18 +55,20 @@ class SceneAtRest:
         """
         begin = self.simulation.start if configuration is None else configuration
         try:
-            return equilibrium.newton(self.system, self.fluid, begin, self.time)
+            return self._inside(equilibrium.newton(self.system, self.fluid, begin, self.time))
         except FAILURES:
             pass
         try:
-            return equilibrium.continued(self.system, self.fluid, begin, self.time)
+            return self._inside(equilibrium.continued(self.system, self.fluid, begin, self.time))
         except FAILURES as failure:
             self._fail(failure)
 
     def settled(self) -> Settled:
         """The stable rest that the motion from the start leads to, and those it passes. Raises RunFailed."""
         try:
-            return equilibrium.settled(self.system, self.fluid, self.simulation.start, self.time)
+            found = equilibrium.settled(self.system, self.fluid, self.simulation.start, self.time)
+            self._inside(found.rests[-1])
+            return found
         except FAILURES as failure:
             self._fail(failure)
 
@@ -81,6 +83,11 @@ class SceneAtRest:
     def zero_rate(self, motion: LinearMotion) -> float:
         """The rate below which a mode neither grows nor decays."""
         return equilibrium.zero_rate(motion, self.time)
+
+    def _inside(self, rest: Rest) -> Rest:
+        """The rest. Raises StepFailed where it is outside of the fluid."""
+        self.simulation.model.fluid_model.refuse(rest.configuration.r)
+        return rest
 
     def _fail(self, failure: Exception) -> NoReturn:
         """Raise RunFailed for a search that found nothing."""

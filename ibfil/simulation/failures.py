@@ -145,6 +145,9 @@ def unsolved(reason: str, dt: float, smallest: float, node: int | None, step: St
         return Failure(
             message, node, step.cause(UNBOUNDED), step.remedy("the loads, law or fluid.flow, or a shorter time.step")
         )
+    if "wall" in reason:
+        cause = "what drives or loads the rod presses it on the wall, where no force of contact holds it off"
+        return Failure(message, node, cause, "filament.NAME.position, direction, or the loads; a smaller fluid.spacing")
     cause = "a rod that snaps, or loads, a law or contact stiffer than any step: no shorter one helped"
     return Failure(
         message,

@@ -170,6 +170,7 @@ class Simulation:
         dt += (after - (now + dt)) + (now - before)
         step = self.model.stepper.step(self.system, self.fluid, self.state_now._replace(time=before), dt)
         self.rods.contact.refuse_passing(self.configuration.r, step.state.configuration.r)
+        self.model.fluid_model.refuse(step.state.configuration.r)
         return step
 
     def _refuse(self, dt: float, reason: str, node: int | None = None) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..analysis.meshes import filament_data, rods_of
 from ..analysis.run import Run, open_run
+from ..assembly.fluids.models import fluid_model
 from ..errors import CaseError
 from ..io.overwriting import BY_ENDING, refuse, replacing
 from ..io.units import label
@@ -149,6 +150,9 @@ class _Pictures:
         pixel = 2 * self.frame.half / size[1]
         self.words = Words(title, tuple(bars), run.case.units.length, pixel, note)
         self.stage = Stage(run, self.frame, size)
+        height = fluid_model(run.case).wall
+        if height is not None:
+            self.stage.wall(height)
 
     def one(self, output: int) -> np.ndarray:
         """The picture (height, width, 3) of an output."""

@@ -17,6 +17,7 @@ import numpy as np
 from ..analysis import periodic_images
 from ..analysis.energy import elastic_energy
 from ..analysis.meshes import box_of
+from ..assembly.fluids.models import fluid_model
 from ..errors import CaseError
 from ..io.overwriting import BY_ENDING, Kind, replacing
 from ..io.units import label
@@ -96,6 +97,19 @@ def _time_colours() -> ListedColormap:
     return ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.92, 256)))
 
 
+def _wall(axes: Axes, run: RunFile, plane: tuple[int, int]) -> None:
+    """A wall below the fluid, seen from the side; as artists, which the limits of the axes do not follow."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Rectangle
+
+    height = fluid_model(run.case).wall
+    if height is None or plane[1] != 2:
+        return
+    across, deep = axes.get_yaxis_transform(), 10 * float(np.ptp(axes.get_ylim()))
+    axes.add_artist(Rectangle((0, height - deep), 1, deep, transform=across, color="0.85", lw=0, zorder=0))
+    axes.add_artist(Line2D((0, 1), (height, height), transform=across, color="0.45", lw=1.2, zorder=0))
+
+
 def _names(axes: Axes, run: RunFile, plane: tuple[int, int]) -> None:
     axes.set_xlabel(with_units(AXES[plane[0]], run.case.units.length))
     axes.set_ylabel(with_units(AXES[plane[1]], run.case.units.length))
@@ -116,6 +130,7 @@ def _shapes(fig: Figure, axes: Axes, run: RunFile, positions: Sequence[np.ndarra
     axes.autoscale_view()
     axes.margins(0.06)
     _names(axes, run, plane)
+    _wall(axes, run, plane)
     axes.set_title("Shapes", loc="left")
     bar = fig.colorbar(lines, ax=axes, pad=0.015, aspect=28)
     bar.set_label(with_units("time", run.case.units.time))
@@ -178,6 +193,7 @@ def _flow(fig: Figure, axes: Axes, run: RunFile, positions: Sequence[np.ndarray]
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(*window[0])
     axes.set_ylim(*window[1])
+    _wall(axes, run, plane)
     place = with_units(
         f"{AXES[across]} = {grid.origin[across] + grid.spacing[across] * level:.3g}", run.case.units.length
     )

@@ -89,6 +89,23 @@ class Stage:
         # Behind all rods, so that it hides none of them; seen from afar nothing else changes.
         self._behind = -2.0 * (frame.look.size + frame.half) * frame.look.towards
 
+    def wall(self, height: float) -> None:
+        """A wall below the fluid, as wide as the picture, with an edge that is seen from the side too."""
+        import pyvista
+
+        centre, wide = np.array(self._frame.look.centre), 2 * self._frame.half * max(1.0, self._frame.aspect)
+        sheet = pyvista.Plane(
+            center=(centre[0], centre[1], height),
+            direction=(0, 0, 1),
+            i_size=wide,
+            j_size=wide,
+            i_resolution=1,
+            j_resolution=1,
+        )
+        self._plotter.add_mesh(sheet, color="#b0a898", opacity=0.5, lighting=False, name="wall", reset_camera=False)
+        edges = sheet.extract_feature_edges()
+        self._plotter.add_mesh(edges, color="#807868", line_width=3, name="edge of the wall", reset_camera=False)
+
     def tubes(self, output: int, scale: Scale) -> None:
         """The filaments at an output as tubes to scale, coloured by a quantity."""
         mesh = self._mesh(output)

@@ -13,6 +13,7 @@ TWISTED = [f"{ROD}.twisting=1", f"{ROD}.radius=0.01"]
 STOKES = ["fluid.model=stokes", "fluid.box=[4, 4, 4]", "fluid.cells=[40, 40, 40]"]
 NAVIER = ["fluid.model=navier-stokes", "fluid.density=1", *STOKES[1:]]
 FREE = ["fluid.model=stokes", "fluid.box=free", "fluid.spacing=0.1"]
+WALL = [*FREE, "fluid.wall=no-slip"]
 SPEED = ["observe.v.kind=speed"]
 THERMAL = ["thermal.energy=1"]
 EXPECT = [*SPEED, "expect.e.observe=v"]
@@ -125,6 +126,18 @@ COMBINATIONS = [
     ([*FREE, "output.window=[1, 1, 1]"], "output.window", "grid_every"),
     ([*FREE, "output.grid_every=1", "output.window_at=[1, 1, 1]"], "output.window_at", "only with window"),
     ([*FREE, "output.grid_every=1", "output.window=[1e4, 1e4, 1e4]"], "output.window", "GiB"),
+    ([*STOKES, "fluid.wall=no-slip"], "fluid.wall", 'only with box = "free"'),
+    ([*WALL, "fluid.method=pruned"], "fluid.method", 'allowed: "auto", "table", "fft" or "krylov"'),
+    ([*WALL, *TWISTED, "fluid.rotation=grid"], "fluid.rotation", 'torques have no image; allowed: "local"'),
+    ([*WALL, "output.grid_every=1", "output.window=[1, 1, 1]", "output.fields=['pressure']"], "output.fields", "veloc"),
+    ([*WALL, "output.probes=[[0, 0, -1]]"], "output.probes.0", "below the wall; allowed: z >= 0"),
+    (
+        [*WALL, "output.grid_every=1", "output.window=[1, 1, 2]", "output.window_at=[0, 0, 0.9]"],
+        "output.window_at",
+        "z of at least 1",
+    ),
+    ([*FREE, "observe.q.kind=flux"], "observe.q.kind", 'only with fluid.wall = "no-slip"'),
+    ([*WALL, "fluid.wall=free-slip", "observe.q.kind=flux"], "observe.q.kind", 'only with fluid.wall = "no-slip"'),
     ([*STOKES, "output.grid_every=1", "output.window=[1, 1, 1]"], "output.window", 'only with box = "free"'),
     (["fluid.drag.matched=0.5", "fluid.box=free"], "fluid.spacing", "thickness or spacing"),
     ([*STOKES, "fluid.model=navier-stokes"], "fluid.density", "navier-stokes"),
@@ -243,6 +256,9 @@ SOUND = [
     [*FREE[:2], "fluid.thickness=0.1", *TWISTED, "fluid.rotation=grid", "fluid.method=krylov"],
     ["fluid.drag.matched=0.5", "fluid.box=free", "fluid.spacing=0.05"],
     ["fluid.box=free"],
+    [*WALL, "observe.q={kind='flux', along=[0, 1, 0]}", "output.probes=[[0, 0, 0]]"],
+    [*WALL, *TWISTED, "fluid.wall=free-slip", "output.grid_every=1", "output.window=[1, 1, 1]"],
+    ["fluid.wall=no-slip", "observe.q.kind=flux"],
     [*STOKES, "fluid.box=[3.2, 0.3, 0.3]", "fluid.cells=[32, 3, 3]", "fluid.kernel=roma3"],
     [*NAVIER, "fluid.flow=['sin(2*pi*y/4)*cos(t)', 'cos(pi*x)', 1]"],
     [*STOKES, "fluid.flow=['y', 0, 0]"],

@@ -10,15 +10,12 @@ import numpy as np
 import pytest
 from helpers.ring_cylinder import drag
 from helpers.scenes import RIBBON, scene
+from helpers.swimmer import IN_FREE_SPACE, swims
 
 import ibfil
 from ibfil import parse_case
-from ibfil.case.library import find
-from ibfil.case.reading import read_case
-from ibfil.observables.time_series import trapezoid_weights
 from ibfil.simulation.simulation import Simulation
 
-PERIOD = 2 * np.pi / 10
 FREE: Mapping[str, Any] = {"model": "stokes", "box": "free", "spacing": 0.025}
 WAVING = {
     "length": 1.0,
@@ -28,20 +25,6 @@ WAVING = {
     "curvature": ["8*sin(4*pi*s - 10*t)", 0],
     "shape": {"kind": "relaxed"},
 }
-
-
-def swims(*changes: str) -> float:
-    """Speed along x of the shipped swimmer over its second and third period."""
-    case = read_case(find("swimmer_stokes"), ["output.grid_every=absent", "output.grid_stride=absent", *changes])
-    simulation, middle = Simulation(case), []
-    weights = trapezoid_weights(simulation.arclength)
-    for k in (1, 2, 3):
-        simulation.advance(k * PERIOD, lambda: None)
-        middle.append(weights @ simulation.configuration.r / weights.sum())
-    return float((middle[2] - middle[0])[0] / (2 * PERIOD))
-
-
-IN_FREE_SPACE = ("fluid.box=free", "fluid.cells=absent", "fluid.spacing=0.025")
 
 
 def in_box(side: float) -> tuple[str, ...]:

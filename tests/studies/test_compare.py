@@ -46,7 +46,7 @@ def result(tmp_path_factory):
 
 
 def test_every_fluid_of_the_schema_can_be_asked_for():
-    assert known_fluids() == ("rft", "matched", "slender", "free", "stokes", "navier-stokes")
+    assert known_fluids() == ("rft", "matched", "slender", "free", "wall", "stokes", "navier-stokes")
     case = parse_case(SWIMMER, "s")
     assert fluid_overrides("matched", case) == ("fluid.model=rft", "fluid.drag={matched=1.0}")
     own = parse_case(SWIMMER, "s", ["fluid.drag={matched=2.0}"])

@@ -44,6 +44,11 @@ FLUIDS: dict[str, tuple[dict[str, Any], float]] = {
     "free krylov": ({**FREE, "method": "krylov"}, 1e-4),
     "free stirred table": ({**FREE, "method": "table", "rotation": "grid", "flow": FLOW}, 1e-11),
     "free stirred fft": ({**FREE, "method": "fft", "rotation": "grid"}, 1e-10),
+    "wall table": ({**FREE, "wall": "no-slip", "method": "table"}, 1e-11),
+    "wall fft in a flow": ({**FREE, "wall": "no-slip", "method": "fft", "flow": FLOW}, 1e-10),
+    "wall krylov": ({**FREE, "wall": "no-slip", "method": "krylov"}, 1e-4),
+    "free-slip wall table": ({**FREE, "wall": "free-slip", "method": "table", "kernel": "bkp6"}, 1e-11),
+    "free-slip wall fft, thick": ({**FREE, "wall": "free-slip", "method": "fft", "thick": True}, 1e-10),
     "navier-stokes table": ({**INERTIA, "method": "table"}, 1e-11),
     "navier-stokes in a flow": ({**INERTIA, "method": "table", "kernel": "es5", "flow": PERIODIC}, 1e-11),
     "navier-stokes fft": ({**INERTIA, "method": "fft", "flow": PERIODIC}, 1e-10),
@@ -103,6 +108,7 @@ SCENES: dict[str, dict[str, dict[str, Any]]] = {
     },
 }
 UNHELD = ["free", "free and twisting"]
+ABOVE = [0.0, 0.0, 0.6]
 BETWEEN = (0.3, 0.34)  # the step's two times
 TAU = 0.03
 
@@ -130,6 +136,11 @@ def asked(fluid: dict[str, Any], rods: dict[str, dict[str, Any]], steps: int = 2
     fluid = {key: value for key, value in fluid.items() if twists or key != "rotation"}
     mass = fluid.pop("mass", None)
     rods = {name: rod if mass is None else {**rod, "mass": mass} for name, rod in rods.items()}
+    if "wall" in fluid:
+        rods = {
+            name: {**rod, "position": np.add(rod.get("position", [0, 0, 0]), ABOVE).tolist()}
+            for name, rod in rods.items()
+        }
     stacked = assembly_rods.rods(scene(rods, fluid))
     made = surrounding(fluid_model(scene(rods, fluid)), stacked).fluid
     system, rng = stacked.system, np.random.default_rng(0)

@@ -82,6 +82,9 @@ class FluidModel(ABC):
 
         return flow(self.case)
 
+    def refuse(self, r: np.ndarray) -> None:  # noqa: B027  (most fluids have no end)
+        """Nothing; raises StepFailed where nodes r (n, 3) have left the fluid, so that a step is not taken."""
+
     def method(self, rods: RodStack) -> str:
         """How velocities are found."""
         return self.case.fluid.model
@@ -175,6 +178,8 @@ class FluidModel(ABC):
     def box(self) -> np.ndarray | None:
         """The sides (3,) of a periodic box, centred on the origin; None where the fluid is not periodic."""
         return None
+
+    wall: float | None = None  # the height z of a wall below the fluid; None where there is none
 
     @property
     def line_radius(self) -> float | None:

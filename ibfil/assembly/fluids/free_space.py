@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ...fluids.spaces.flow_of_forces import FlowOfForces
     from ...fluids.spaces.free import FreeSpace
     from ...fluids.stokes import Solver
+    from ...grid.free_fft import FreeSolve
     from ...grid.periodic_grid import Lattice
     from ..stacked import RodStack
 
@@ -51,6 +52,10 @@ class FreeModel(ImmersedModel):
 
     def solver(self) -> Solver:
         """The solver for velocities by FFTs of the nodes' box."""
+        return self.free_solver()
+
+    def free_solver(self) -> FreeSolve:
+        """That of free space."""
         from ...grid.free_fft import FreeSolve
 
         fluid, vectors = self.case.fluid, self.components - 2
@@ -60,9 +65,10 @@ class FreeModel(ImmersedModel):
         """Heat by the power of the nodes, fields in the window."""
         from ...fluids.output import SpaceOutput
 
-        return SpaceOutput(self.immersed(rods), fluid, self._fields())
+        return SpaceOutput(self.immersed(rods), fluid, self.fields())
 
-    def _fields(self) -> FieldSource | None:
+    def fields(self) -> FieldSource | None:
+        """The fields in the window; None where there is none."""
         from ...fluids.spaces.free_fields import FreeFields
 
         if self.grid is None:
@@ -71,7 +77,7 @@ class FreeModel(ImmersedModel):
 
     # -- what a step costs
 
-    def _cells(self, rods: RodStack) -> list[int]:
+    def cells(self, rods: RodStack) -> list[int]:
         """Cells of the transforms at the start."""
         from ...grid.free_fft import padded
 
@@ -85,7 +91,7 @@ class FreeModel(ImmersedModel):
 
     def evaluation(self, rods: RodStack) -> float:
         """By convolutions in the nodes' box."""
-        return (self.components - 2) * costs.full_evaluation(self._cells(rods)) + len(rods.s) * costs.SPREAD
+        return (self.components - 2) * costs.full_evaluation(self.cells(rods)) + len(rods.s) * costs.SPREAD
 
     def field_evaluation(self) -> float:
         """A convolution from nodes that take up as much as the window, with the transforms of the response."""
@@ -105,7 +111,7 @@ class FreeModel(ImmersedModel):
         """Fields and symbols too, where steps transform them; and those of the window."""
         out, vectors, fields = super().memory(rods), self.components - 2, 0.0
         if self.transforms(rods):
-            fields += (2 * 3 * vectors + 2) * 8.0 * float(np.prod(self._cells(rods)))
+            fields += (2 * 3 * vectors + 2) * 8.0 * float(np.prod(self.cells(rods)))
         if self.grid is not None:
             fields += 30 * 8.0 * float(np.prod(2 * self.grid.cells))
         return out | ({FIELDS: fields} if fields else {})

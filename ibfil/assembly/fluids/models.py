@@ -9,6 +9,7 @@ from .free_space import FreeModel
 from .navier_stokes import NavierStokesModel
 from .resistive_force import ResistiveForceModel
 from .stokes import StokesModel
+from .wall import WallModel
 
 if TYPE_CHECKING:
     from ...case.schema import Case
@@ -17,6 +18,7 @@ MODELS: dict[str, type[FluidModel]] = {
     "rft": ResistiveForceModel,
     "stokes": StokesModel,
     "free": FreeModel,
+    "wall": WallModel,
     "navier-stokes": NavierStokesModel,
 }
 

@@ -67,8 +67,9 @@ class ResistiveForceModel(FluidModel):
         return out
 
     def absent(self) -> list[str]:
-        """Hydrodynamic interaction, and all that a grid takes."""
-        return ["hydrodynamic interaction; grid and FFT plans"]
+        """Hydrodynamic interaction, and all that a grid takes; what a wall does to drag."""
+        wall = [] if self.case.fluid.wall is None else ["the wall: drag is the same at any height"]
+        return ["hydrodynamic interaction; grid and FFT plans", *wall]
 
     def groups(self, filament: Filament, rate: float) -> dict[str, float]:
         """The radius that the case gives; with drag calibrated on a grid what was found there."""

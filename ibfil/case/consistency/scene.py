@@ -213,13 +213,13 @@ def _observe(case: Scene) -> Iterator[Fault]:
 def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
     filament = single(case.filaments, entry.filament)
     if filament is None and entry.filament in case.filaments:
-        if entry.kind != "dissipation":  # of all together
+        if not entry.together:
             found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
             yield Fault(f"{key}.filament", found, f'a copy by its name, "{name}" being the first', ("filament",))
-    elif filament is None:
+    elif filament is None and not (entry.together and not entry.filament):
         found = shown(entry.filament) + suggestion(entry.filament, case.filaments) if entry.filament else "nothing"
         yield Fault(f"{key}.filament", found, f"one of {', '.join(case.filaments)}", ("filament",))
-    elif not isinstance(entry.at, str):
+    elif filament is not None and not isinstance(entry.at, str):
         last = entry.at[1] if isinstance(entry.at, tuple) else entry.at
         if last > filament.length * (1.0 + 1e-12):
             reads = (f"{key}.filament", f"filament.{entry.filament}.length")

@@ -26,6 +26,12 @@ def check_space(case: Scene) -> Iterator[Fault]:
     yield from _free(fluid) if fluid.free else _periodic(fluid)
     if fluid.on_grid:
         yield from _window(case)
+        yield from _wall(case)
+    for name, entry in case.observe.items():
+        if entry.pumps and not fluid.sticks:
+            yield Fault(
+                f"observe.{name}.kind", shown(entry.kind), 'flux only with fluid.wall = "no-slip"', ("fluid.wall",)
+            )
 
 
 def _free(fluid: Fluid) -> Iterator[Fault]:
@@ -93,3 +99,26 @@ def _window(case: Scene) -> Iterator[Fault]:
         yield Fault("output.window", "nothing, and grid_every", allowed, (*reads, "output.grid_every"))
     if output.window_at is not None and output.window is None:
         yield Fault("output.window_at", "window_at and no window", "only with window", ("output.window",))
+
+
+def _wall(case: Scene) -> Iterator[Fault]:
+    """A plane bounds free space; torques, and fields of a force but its velocity, have no image in one that sticks."""
+    fluid, output = case.fluid, case.output
+    if fluid.wall is None:
+        return
+    reads, named = ("fluid.wall", "fluid.box", "fluid.model"), f"wall = {shown(fluid.wall)}"
+    if not fluid.free:
+        found = f"{shown(fluid.wall)} with a periodic box"
+        yield Fault("fluid.wall", found, f"only with {_FREE}", ("fluid.box", "fluid.model"))
+    if case.couples_torque:
+        found = f"{shown(fluid.rotation)} with {named}, in which torques have no image"
+        yield Fault("fluid.rotation", found, '"local"', (*reads, "filament"))
+    if fluid.sticks and output.grid_every is not None and set(output.fields) != {"velocity"}:
+        yield Fault("output.fields", f"{shown(list(output.fields))} with {named}", '["velocity"]', reads)
+    for i, place in enumerate(output.probes):
+        if place[2] < 0:
+            yield Fault(f"output.probes.{i}", f"{shown(list(place))}, below the wall", "z >= 0", reads)
+    if output.window is not None and output.window_at is not None and output.window_at[2] < 0.5 * output.window[2]:
+        found = f"{shown(list(output.window_at))}, with window a part of which is below the wall"
+        allowed = f"z of at least {0.5 * output.window[2]:g}, half its height"
+        yield Fault("output.window_at", found, allowed, (*reads, "output.window"))

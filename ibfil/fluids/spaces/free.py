@@ -11,7 +11,7 @@ from ...grid.kernels import Kernel
 from ...grid.spreading import Stencil
 from ..coupling import Coupling
 from ..mobility_table import Octant
-from .base import TableMobility
+from .base import Mobility, TableMobility
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class FreeSpace:
 
     def mobility(
         self, coupling: Coupling, points: int, viscosity: float, alpha: float = 0.0, number: type = np.float64
-    ) -> TableMobility:
+    ) -> Mobility:
         """By the one table, and beyond its reach by Oseen's tensor. Raises ValueError for a fluid with inertia."""
         if alpha:
             raise ValueError("the response of free space is that of Stokes flow")
