@@ -132,6 +132,27 @@ def polylines(
     return _poly_data(np.concatenate(points), lengths, arrays, snapshot.time)
 
 
+def link_lines(snapshot: Snapshot) -> vtkDataSet:
+    """All links at one time as vtkPolyData: a line an element, from point to point, where they are unwrapped.
+
+    At both points: the size of its force (``link_force``), the force on that point (``force``), the number of the link
+    and ``tension``, ``slide`` and ``shear``, no number where its kind has none.
+    """
+    points: list[np.ndarray] = []
+    arrays: list[dict[str, np.ndarray]] = []
+    for number, link in enumerate(snapshot.links.values()):
+        points.append(np.stack([link.first, link.second], axis=1).reshape(-1, 3))
+        count, vectors = len(link.first), np.stack([-link.force, link.force], axis=1).reshape(-1, 3)
+        size = np.linalg.norm(vectors, axis=1)
+        shown = {"link_force": size, "force": vectors, "link": np.full(2 * count, number, np.int32)}
+        for name in ("tension", "slide", "shear"):
+            values = getattr(link, name)
+            shown[name] = np.repeat(np.full(count, np.nan) if values is None else values, 2)
+        arrays.append({k: v if v.dtype == np.int32 else v.astype(np.float32) for k, v in shown.items()})
+    whole = np.concatenate(points)
+    return _poly_data(whole, [2] * (len(whole) // 2), arrays, snapshot.time)
+
+
 def _on(pieces: Pieces, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {key: pieces.take(values).astype(np.float32) for key, values in arrays.items()}
 

@@ -120,7 +120,7 @@ class Run(RunFile):
         return pyvista.wrap(field_data(self, int(np.argmin(np.abs(times - (times[-1] if time is None else time))))))
 
     def to_xarray(self) -> xarray.Dataset:
-        """All but the fields as one dataset, read whole: NAME_position (time, NAME_node, xyz) ... and observables.
+        """All but the fields as one dataset, read whole: NAME_position (time, NAME_node, xyz) ..., links, observables.
 
         Each variable carries its units and description. Raises ImportError where xarray is not installed.
         """
@@ -136,6 +136,12 @@ class Run(RunFile):
                 along = () if key.startswith("reaction") else (f"{name}_segment" if key == "tension" else node,)
                 last = ("xyz",) if len(column.shape) > 1 + len(along) else ()
                 variables[f"{name}_{key}"] = (("time", *along, *last), np.asarray(column), self._about(name, key))
+        for name, columns in self.links.items():
+            for key, column in columns.items():
+                last = ("xyz",) if len(column.shape) > 2 else ()
+                path = f"links/{name}/{key}"
+                about = {"units": self.units(path), "description": self.description(path)}
+                variables[f"{name}_{key}"] = (("time", f"{name}_element", *last), np.asarray(column), about)
         for group, found in (("observables", self.observables), ("diagnostics", self.diagnostics)):
             for name, column in found.items():
                 dims = ("time", *(f"{name}_{i}" if n != 3 else "xyz" for i, n in enumerate(column.shape[1:])))

@@ -21,6 +21,7 @@ _PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
 _COMPONENTS = 2.5  # the same of a table with torques, of one without
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
+_ELEMENT = 1.0e-5  # an element of a link for its force and stiffness
 _ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
 _PRODUCTS = 11  # of GMRES with a preconditioner rod by rod, an iteration of Newton
 _LARGEST = 2.0**30  # bytes that the table's dense matrices may take before the table is out of the question
@@ -61,6 +62,16 @@ def factored(nodes: int, parts: int = 3) -> float:
 def of_rods(case: Case, nodes: int, scheme: str = "") -> float:
     """Seconds a step takes for the rods alone, in the case's scheme or another."""
     return _ROUNDS[scheme or case.time.scheme] * nodes * _NODE
+
+
+def of_links(case: Case, elements: int) -> float:
+    """Seconds a step for the forces and stiffness of so many elements of links."""
+    return _ROUNDS[case.time.scheme] * elements * _ELEMENT
+
+
+def of_factors(case: Case, operations: int, unknowns: int) -> float:
+    """Seconds a step for factors that take so many products of blocks."""
+    return _ROUNDS[case.time.scheme] * operations * 2.0 * unknowns**3 * _FLOP
 
 
 def of_inertia(cells: Sequence[int], parts: int) -> float:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ..case.schema import Case
     from ..rods.constitutive import MomentLaw
     from ..rods.contact import Contact
+    from ..rods.links.base import Link
 
 
 def _turn(end) -> Turn | None:
@@ -71,11 +72,22 @@ def _place(case: Case) -> list[Placed]:
         if filament.copies is None:
             out.append(Placed(name, filament, s, r, e1, held))
             continue
-        for k, turn, shift in copies.places(filament.copies, filament.position, key, folder):
-            moved = (r - filament.position) @ turn.T + shift
+        about = _centre(case, name)
+        for k, turn, shift in copies.places(filament.copies, about, key, folder):
+            moved = (r - about) @ turn.T + shift
             turned = tuple(None if t is None else turn @ t for t in held)
             out.append(Placed(copy_name(name, k), filament, s, moved, e1 @ turn.T, turned))
     return out
+
+
+def _centre(case: Case, name: str) -> tuple[float, float, float]:
+    """The point about which a filament is copied: its position, or that of the first of all that are linked to it."""
+    joined, more = {name}, True
+    while more:
+        found = {other for link in case.links.values() if joined & set(link.names) for other in link.names}
+        more = not found <= joined
+        joined |= found
+    return next(filament.position for other, filament in case.filaments.items() if other in joined)
 
 
 def _clamp_tangents(filament: Filament, key: str, folder: Path) -> Tangents:
@@ -143,6 +155,13 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
 
         touching = contact(case, names, filaments, nodes, s)
         forces += touching.loads()
+    joined: list[Link] = []
+    if case.links:
+        from .links import Held, links
+
+        held = [Held(k, p.name, p.filament, where, p.s) for k, (p, where) in enumerate(zip(placed, nodes, strict=True))]
+        joined = links(case, held, np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
+        forces += joined
     system = kind(mesh, law, stretching, free, ends, forces, unknowns, length)
     start = system.start(np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
-    return RodStack(names, filaments, tuple(nodes), s, system, start, touching)
+    return RodStack(names, filaments, tuple(nodes), s, system, start, touching, tuple(joined))

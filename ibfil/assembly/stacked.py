@@ -15,11 +15,15 @@ from ..rods.system import RodSystem
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..rods.contact import Contact
+    from ..rods.links.base import Link
+
+
+TOGETHER = 500  # nodes of linked filaments that a preconditioner takes as one block
 
 
 @dataclass(frozen=True)
 class RodStack:
-    """The rods of a scene: names and node ranges of its filaments, arclength (n,), and the whole of their mechanics."""
+    """The rods of a scene: names and node ranges of its filaments, arclength (n,), links, and all their mechanics."""
 
     names: tuple[str, ...]
     filaments: tuple[Filament, ...]
@@ -28,6 +32,22 @@ class RodStack:
     system: RodSystem
     start: Configuration
     contact: Contact | NoContact
+    links: tuple[Link, ...] = ()
+
+    @cached_property
+    def groups(self) -> tuple[tuple[slice, ...], ...]:
+        """The node ranges of filaments that a preconditioner takes together: linked ones, while they are few nodes."""
+        group = list(range(len(self.nodes)))
+        nodes = [where.stop - where.start for where in self.nodes]
+        for link in self.links:
+            one, other = (group[k] for k in (link.filaments[0], link.filaments[-1]))
+            if one != other and nodes[one] + nodes[other] <= TOGETHER:
+                group = [one if k == other else k for k in group]
+                nodes[one] += nodes[other]
+        members: dict[int, list[slice]] = {}
+        for k, where in zip(group, self.nodes, strict=True):
+            members.setdefault(k, []).append(where)
+        return tuple(tuple(ranges) for ranges in members.values())
 
     @cached_property
     def twists(self) -> np.ndarray:
@@ -35,9 +55,15 @@ class RodStack:
         return np.repeat([f.twisting is not None for f in self.filaments], [w.stop - w.start for w in self.nodes])
 
     @property
-    def groups(self) -> tuple[tuple[slice, ...], ...]:
-        """The node ranges of filaments that a preconditioner takes together."""
-        return tuple((where,) for where in self.nodes)
+    def linked(self) -> tuple[np.ndarray, np.ndarray]:
+        """The pairs of nodes (l,) that links couple."""
+        rows, columns = zip(*(link.pairs for link in self.links), strict=True)
+        return np.concatenate(rows), np.concatenate(columns)
+
+    @property
+    def group_sizes(self) -> list[int]:
+        """How many nodes each of the groups has."""
+        return [sum(where.stop - where.start for where in group) for group in self.groups]
 
     def locate(self, node: int) -> tuple[str, int]:
         """The filament that a node of the stack is of, and its number there."""

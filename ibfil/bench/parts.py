@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from ..errors import CaseError
+from . import linked as bench_linked
 from . import many as bench_many
 from . import pieces
 from . import threads as bench_threads
@@ -50,6 +51,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     ],
     "swimmer": lambda: pieces.swimmers(),
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],
+    "links": lambda: [*bench_linked.linked(6, (280.0, None)), *bench_linked.linked(2, (165.0, None))],
     "threads": threads,
     "many": lambda: many(),
 }

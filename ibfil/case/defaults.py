@@ -41,7 +41,7 @@ def fill_defaults(filled: dict[str, Any], parameters: Parameters) -> None:
     scheme = table("time").setdefault("scheme", "semi-implicit" if "thermal" in filled else "implicit")
     table("time").setdefault("order", 2 if scheme == "implicit" else 1)
     for name in table("observe"):
-        if len(filaments) == 1:
+        if len(filaments) == 1 and "link" not in table("observe", name):
             table("observe", name).setdefault("filament", next(iter(filaments)))
     for name in table("expect"):
         if "value" in table("expect", name) and "absolute" not in table("expect", name):

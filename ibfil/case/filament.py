@@ -230,6 +230,11 @@ class Filament(Table):
     loads: Loads | None = Field(None, description="loads per length")
 
     @property
+    def keeps_no_plane(self) -> bool:
+        """Whether it is round and naturally straight: without twisting it then bends in any plane."""
+        return self.bending[0] == self.bending[1] and all(kappa.constant == 0.0 for kappa in self.curvature)
+
+    @property
     def aligned(self) -> str:
         """The direction of the shape that points along ``direction``: axis, tangent or chord."""
         if self.align != "auto":

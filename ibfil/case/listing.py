@@ -41,13 +41,15 @@ def _keys(path: str, tables: Tables) -> Iterator[str]:
     shared = [key for key in keys(tables[0]) if all(key in keys(table) for table in tables)]
     shared = [key for key in shared if not (several and key == "kind")]
     yield from _values(tables[0], [key for key in shared if not _is_table(_info(tables[0], key))])
+    inside = dict.fromkeys(shared, tables[0])
     for table in tables if several else ():
         own = [key for key in keys(table) if key not in shared and key != "kind"]
         if "kind" in table.model_fields:
             yield f'  kind = "{table.model_fields["kind"].default}": {table.model_fields["kind"].description}'
         yield from _values(table, own)
-    for key in shared:
-        info = _info(tables[0], key)
+        inside = {**dict.fromkeys(own, table), **inside}
+    for key, table in inside.items():
+        info = _info(table, key)
         inner, form = _inner(info.annotation)
         if not inner:
             continue
@@ -90,13 +92,11 @@ def _is_table(info: FieldInfo) -> bool:
 
 def _inner(hint: Any) -> tuple[Tables, str]:
     """The tables a key may hold, and how their heading is written."""
-    tables, form = [], "[{}]"
+    found, form = [], "[{}]"
     for member in members(hint):
-        item = member
+        found += [member]
         if get_origin(member) is dict:
-            item, form = get_args(member)[1], "[{}.NAME]"
+            found[-1:], form = members(get_args(member)[1]), "[{}.NAME]"
         elif get_origin(member) is tuple:
-            item, form = get_args(member)[0], "[[{}]]"
-        if isinstance(item, type) and issubclass(item, BaseModel):
-            tables.append(item)
-    return tables, form
+            found[-1:], form = members(get_args(member)[0]), "[[{}]]"
+    return [item for item in found if isinstance(item, type) and issubclass(item, BaseModel)], form

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from .filament import Filament
 from .fluid import Contact, Fluid
+from .link import Link
 from .table import Table
 from .values import (
     Count,
@@ -129,8 +130,12 @@ class Observe(Table):
         "dissipation",
         "flux",
         "efficiency",
+        "link_tension",
+        "link_slide",
+        "link_shear",
     ] = Field(description="what is taken; each is explained at the end of `ibfil schema`", examples=["speed"])
     filament: str = Field("", description="name of a filament; needed where there are several")
+    link: str = Field("", description="name of a link, where the kind looks at one")
     at: Annotated[
         float | tuple[float, float] | Literal["start", "finish", "middle", "centroid"],
         Place(("start", "finish", "middle", "centroid")),
@@ -152,6 +157,11 @@ class Observe(Table):
     def pumps(self) -> bool:
         """Whether it is a flux along a wall."""
         return self.kind == "flux"
+
+    @property
+    def of_link(self) -> bool:
+        """Whether it looks at a link, and at no filament."""
+        return self.kind.startswith("link_")
 
     @property
     def reduces(self) -> bool:
@@ -211,6 +221,7 @@ class Scene(Table):
         description="one table a filament",
         examples=[{"name": {"length": 1.0, "nodes": 41, "bending": 1.0, "stretching": 1e4}}],
     )
+    links: dict[str, Link] = Field({}, alias="link", description="one table a link between filaments")
     contact: Contact | None = Field(None, description="absent: not looked for")
     fluid: Fluid = Field(description="the fluid", examples=[{"model": "rft", "viscosity": 1.0}])
     thermal: Thermal | None = Field(None, description="thermal noise, rft only")

@@ -152,20 +152,23 @@ class Formula(Kind):
 
 @dataclass(frozen=True)
 class Place(Kind):
-    """A word, an arclength, or a window [s1, s2] with s1 < s2."""
+    """A word, an arclength, or where ``window`` a window [s1, s2] with s1 < s2."""
+
+    window: bool = True
 
     def _values(self) -> str:
-        return f"{NUMBER} >= 0 or a pair [s1, s2] of them, s1 < s2"
+        return f"{NUMBER} >= 0" + (" or a pair [s1, s2] of them, s1 < s2" if self.window else "")
 
     def _schema(self) -> list[dict[str, Any]]:
         number = {"anyOf": Number(low=0, open=False)._schema()}
-        return [number, {"type": "array", "prefixItems": [number, number], "minItems": 2, "maxItems": 2}]
+        pair = {"type": "array", "prefixItems": [number, number], "minItems": 2, "maxItems": 2}
+        return [number, pair] if self.window else [number]
 
     def _take(self, value: Any, parameters: Parameters | None) -> float | tuple[float, float]:
         number = Number(low=0, open=False)
         if not isinstance(value, list):
             return number._take(value, parameters)
-        if len(value) != 2:
+        if len(value) != 2 or not self.window:
             raise refuse()
         first, last = (number._take(item, parameters) for item in value)
         if first >= last:

@@ -33,6 +33,9 @@ def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
     out = [Term("bending and stretching", rods, band * 9 / unknowns**2)]
     if unknowns == 4:
         out.append(Term("twisting", _TWISTING * rods, band * 7 / 16))
+    elements = sum(len(link.elements.nodes) for link in simulation.rods.links)
+    if elements:
+        out.append(Term("links", costs.of_links(case, elements), elements * 16 * 8.0 * unknowns**2))
     if case.contact is not None:
         out.append(Term("contact", _CONTACT * implicit, 8.0 * 30 * n))
     if case.thermal is not None:

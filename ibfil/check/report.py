@@ -67,6 +67,7 @@ def modelled(case: Case) -> list[str]:
             terms += [f"{words} at {side}" for key, words in _MOTIONS.items() if getattr(end, key) is not None]
         terms += [row.words for row in named(ALONG, f.loads)]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
+    out += [f"link {name}: {link.words}" for name, link in case.links.items()]
     if case.fluid.flow is not None:
         spins = ", and spins those that twist by half its vorticity about the tangent" if case.twists else ""
         out.append(f"a background flow, which moves the nodes{spins}")
@@ -107,6 +108,8 @@ def absent(case: Case) -> list[str]:
         out.append("field output")
     if case.contact is None:
         out.append("contact: filaments may pass through each other")
+    if not case.links:
+        out.append("links between filaments")
     if case.thermal is None:
         out.append("thermal noise")
     elif not case.thermal.twist and case.twists:

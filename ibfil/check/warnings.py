@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 SLOWED, DAMPED = 0.02, 0.2  # by which steps may change omega, and the decay, of a rod's own oscillation
 FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
 QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
+STRAINED = 1e-6  # of the length of a filament: strain of a link at the start that is none
+STIFF = 1e6  # stiffness of a link times the step over the drag of a node: beyond it Krylov's forces drift
 THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
 
 
@@ -35,7 +37,7 @@ def warnings(simulation: Simulation) -> list[str]:
         out += _of_inertia(simulation, name, filament)
         where = simulation.nodes(name)
         out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
-    return out + _of_given_step(simulation) + _of_run(simulation) + fluid.warnings(simulation)
+    return out + _of_given_step(simulation) + _of_links(simulation) + _of_run(simulation) + fluid.warnings(simulation)
 
 
 def _of_given_step(simulation: Simulation) -> list[str]:
@@ -49,6 +51,27 @@ def _of_given_step(simulation: Simulation) -> list[str]:
         steps.OWN: simulation.growth_rate(),
     }
     return [steps.too_long(dt, what, rate) for what, rate in rates.items() if steps.is_long(dt, rate)]
+
+
+def _of_links(simulation: Simulation) -> list[str]:
+    """Links that are strained as the run begins, or stiffer than a step resolves."""
+    out: list[str] = []
+    drag = min(simulation.drag(f) * f.length / (f.nodes - 1) for f in simulation.case.filaments.values())
+    for link in simulation.rods.links:
+        passive = link.strained(simulation.configuration)
+        if passive > STRAINED * simulation.system.length:
+            out.append(
+                f"link.{link.name}: strained by {passive:.3g} at the start, and so moves the rods at once; "
+                'rest (distance, slide) as the start has it, "initial" where that is allowed'
+            )
+        stiff = link.stiffest * simulation.step_length / drag
+        if stiff > STIFF:
+            most = link.stiffest * STIFF / stiff
+            out.append(
+                f"link.{link.name}: its stiffness times the step is {stiff:.2g} times a node's drag: above {STIFF:g} "
+                f"its force has fewer digits, and by Krylov is wrong: a stiffness below {most / link.unit:.2g}"
+            )
+    return out
 
 
 def _of_inertia(simulation: Simulation, name: str, filament: Filament) -> list[str]:

@@ -30,5 +30,5 @@ def do(arguments: argparse.Namespace) -> int:
     tell(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
     alone = path.with_stem(f"{path.stem}_filaments")
     if alone.exists():
-        tell(f"for filters of lines, such as Tube: {alone}, without the grid")
+        tell(f"for filters of lines, such as Tube: {alone}, of the filaments alone")
     return DONE

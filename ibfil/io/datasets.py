@@ -22,6 +22,18 @@ _FILAMENT = {
     "torque": ("force length", "twist torque of each node on the fluid, along the tangent"),
     "spin": ("1/time", "rate at which the first material director turns about the tangent, along it"),
 }
+_LINK = {
+    "first": ("length", "points on the first of what the link joins"),
+    "second": ("length", "points on the second"),
+    "force": ("force", "force of the link on the second, the opposite of that on the first"),
+    "length": ("length", "distance of the points of a spring"),
+    "tension": ("force", "tension, positive where it draws them together; of bound filaments per length"),
+    "angle": ("1", "angle between the segments of a hinge"),
+    "moment": ("force length", "moment of a hinge"),
+    "slide": ("length", "slide of the second of bound filaments along the first"),
+    "shear": ("force/length", "shear force per length on the second of bound filaments, along it"),
+    "active": ("force/length", "the active part of the shear force per length"),
+}
 _DIAGNOSTICS = {
     "net_force": ("force", "total force on the fluid"),
     "net_torque": ("force length", "total torque on the fluid"),
@@ -62,16 +74,17 @@ def meaning_of(name: str, observables: Mapping[str, Meaning]) -> Meaning:
         return observables[last]
     if group == "diagnostics":
         return Meaning(*_DIAGNOSTICS.get(last, ("1", last.replace("_", " "))))
-    return Meaning(*_FILAMENT[last])
+    return Meaning(*(_LINK if group.startswith("links/") else _FILAMENT)[last])
 
 
 def rows_of(snapshot: Snapshot, series: Mapping[str, Any]) -> dict[str, Any]:
     """Dataset -> value of one output."""
     rows: dict[str, Any] = {"time": snapshot.time}
-    for name, filament in snapshot.filaments.items():
-        for field in fields_of(filament):
-            value = getattr(filament, field.name)
-            if value is not None:
-                rows[f"filaments/{name}/{field.name}"] = value
+    for kind, found in (("filaments", snapshot.filaments), ("links", snapshot.links)):
+        for name, part in found.items():
+            for field in fields_of(part):
+                value = getattr(part, field.name)
+                if value is not None:
+                    rows[f"{kind}/{name}/{field.name}"] = value
     rows |= {f"observables/{name}": value for name, value in series.items()}
     return rows | {f"diagnostics/{name}": value for name, value in snapshot.diagnostics.items()}

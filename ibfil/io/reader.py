@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -23,16 +24,13 @@ from .opening import damaged, open_run_file
 from .ownership import is_being_written
 from .pace import pace_of
 from .paths import journal_path
-from .snapshots import FilamentSnapshot, Snapshot
+from .snapshots import FilamentSnapshot, LinkSnapshot, Snapshot
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..case.schema import Case
 
 
-# Of FilamentFrame: there where that end is held, and where the filament twists.
-_OPTIONAL = ("reaction_start", "reaction_finish", "torque", "spin")
-_KEYS = ("position", "velocity", "force", "e1", "moment", "strain", "tension", *_OPTIONAL)
 _GROUPS = ("filaments", "observables", "diagnostics")
 _BLOCK = 256  # outputs read at once by `frames`
 
@@ -129,6 +127,11 @@ class RunFile:
         reaction_finish (T, 3) where that end is held; torque, spin (T, N, 3) where the filament twists.
         """
         return {name: self._columns(f"filaments/{name}") for name in self._file["filaments"]}
+
+    @cached_property
+    def links(self) -> dict[str, dict[str, Column]]:
+        """Link -> name -> Column (T, K, 3) or (T, K): the attributes of a LinkSnapshot that its kind has."""
+        return {name: self._columns(f"links/{name}") for name in self._file.get("links", {})}
 
     @cached_property
     def observables(self) -> dict[str, Column]:
@@ -266,15 +269,17 @@ class RunFile:
         for low in range(start, stop, _BLOCK):
             block = slice(low, min(low + _BLOCK, stop))
             filaments = {n: {k: c[block] for k, c in columns.items()} for n, columns in self.filaments.items()}
+            links = {n: {k: c[block] for k, c in columns.items()} for n, columns in self.links.items()}
             diagnostics = {name: column[block] for name, column in self.diagnostics.items()}
             for i, time in enumerate(self.time[block]):
                 yield Snapshot(
                     time=float(time),
-                    filaments={name: _filament_snapshot(arrays, i) for name, arrays in filaments.items()},
+                    filaments={name: _at(FilamentSnapshot, arrays, i) for name, arrays in filaments.items()},
+                    links={name: _at(LinkSnapshot, arrays, i) for name, arrays in links.items()},
                     diagnostics={k: float(v[i]) if v.ndim == 1 else v[i] for k, v in diagnostics.items()},
                 )
 
 
-def _filament_snapshot(arrays: dict[str, np.ndarray], i: int) -> FilamentSnapshot:
-    values: dict[str, Any] = {key: arrays[key][i] if key in arrays else None for key in _KEYS}
-    return FilamentSnapshot(**values)
+def _at(kind: Any, arrays: dict[str, np.ndarray], i: int) -> Any:
+    """Output ``i`` of a filament or a link, None where it has no such part."""
+    return kind(**{part.name: arrays[part.name][i] if part.name in arrays else None for part in fields(kind)})

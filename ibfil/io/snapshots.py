@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,6 +33,22 @@ class FilamentSnapshot:
 
 
 @dataclass(frozen=True)
+class LinkSnapshot:
+    """One link of K elements at one time: a spring and a hinge have one, two bound filaments one a segment."""
+
+    first: np.ndarray  # (K, 3) the points that it joins
+    second: np.ndarray  # (K, 3)
+    force: np.ndarray  # (K, 3) on the second; on the first the opposite
+    length: np.ndarray | None = None  # (K,) of a spring
+    tension: np.ndarray | None = None  # (K,) positive where it draws them together; of a bound pair per length
+    angle: np.ndarray | None = None  # (K,) of a hinge
+    moment: np.ndarray | None = None  # (K,) of a hinge
+    slide: np.ndarray | None = None  # (K,) of a bound pair, the second along the first
+    shear: np.ndarray | None = None  # (K,) of a bound pair, force per length along it on the second
+    active: np.ndarray | None = None  # (K,) what of that is active
+
+
+@dataclass(frozen=True)
 class Snapshot:
     """All filaments at one time, with the diagnostics taken at outputs and the fields where they were asked for."""
 
@@ -40,3 +56,4 @@ class Snapshot:
     filaments: dict[str, FilamentSnapshot]
     diagnostics: dict[str, float | np.ndarray]
     grid: dict[str, np.ndarray] | None = None
+    links: dict[str, LinkSnapshot] = field(default_factory=dict)

@@ -39,6 +39,11 @@ class Pattern(NamedTuple):
     band: np.ndarray  # (n, 2 w + 1) the block that each of the band goes to, by node; -1 outside the profile
     pairs: np.ndarray  # (l,) the block that each coupled pair goes to
 
+    @property
+    def operations(self) -> int:
+        """Products of blocks that elimination takes."""
+        return int(np.sum((self.start[1:] - self.diagonal - 1) ** 2))
+
 
 @njit(cache=True)
 def _tree(start, column):

@@ -126,7 +126,7 @@ class ObservableBase:
         along = observe.along or self.along
         self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
         details = [f"{key} = {_shown(getattr(observe, key))}" for key in ("at", "along", "space") if key in given]
-        whose = "all filaments" if observe.together else observe.filament
+        whose = "all filaments" if observe.together else observe.link or observe.filament
         self.description = ", ".join([f"{self.description} of {whose}", *details])
         how = "" if self.fitted else _SUMMARIES[observe.summary].words
         over = [] if observe.over is None else [f"over = {_shown(observe.over)}"]

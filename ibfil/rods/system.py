@@ -5,7 +5,7 @@ Everything a stepper asks of the rods is here, and nothing of the fluid.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .elastic_force import Moment
 from .geometry import Configuration, measure, moved, tangents, turned
 from .linearization import Linearization
 from .mesh import Mesh
+from .rates import Accepted, Memory, Remembering
 
 
 class RodSystem:
@@ -48,6 +49,7 @@ class RodSystem:
         self._zero = np.zeros(len(free))
         self._held = np.zeros(len(free), bool)
         self._held[ends.index[ends.index % unknowns < 3] // unknowns] = True
+        self.remembering = tuple(part for part in (law, *loads) if isinstance(part, Remembering))
 
     def start(self, r: np.ndarray, e1: np.ndarray) -> Configuration:
         """The configuration r (n, 3) with e1 (n, 3) made normal to the stencils' tangents."""
@@ -132,6 +134,26 @@ class RodSystem:
         for load in self.loads:
             load.add_stiffness(time, linearization)
         return linearization.stiffness
+
+    def begin(self, tau: float, w: float) -> None:
+        """A step of effective length tau begins, w = dt/dt_old, zero where it does not look back (rates.py)."""
+        for part in self.remembering:
+            part.begin(tau, w)
+
+    def advance(self, step: Accepted) -> None:
+        """The step that began last is taken."""
+        for part in self.remembering:
+            part.advance(step)
+
+    def memory(self) -> Memory:
+        """The state that laws and loads carry from step to step, by name; part of a run's state."""
+        return {f"{part.key}_{name}": value for part in self.remembering for name, value in part.memory().items()}
+
+    def recall(self, memory: Mapping[str, np.ndarray | float]) -> None:
+        """Takes up what ``memory`` gave."""
+        for part in self.remembering:
+            start = f"{part.key}_"
+            part.recall({name.removeprefix(start): value for name, value in memory.items() if name.startswith(start)})
 
     def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, NoReturn
 
-from ..case.walk import expressions
+from ..case.table import expressions
 from ..errors import CaseError, RunFailed
 from ..timestepping import equilibrium
 from ..timestepping.base import FAILURES
@@ -111,6 +111,7 @@ def refuse_driven(case: Case) -> None:
 
 def _driven(case: Case) -> Iterator[str]:
     found = [(f"filament.{name}.{path}", e) for name, f in case.filaments.items() for path, e in expressions(f)]
+    found += [(f"link.{name}.{path}", e) for name, link in case.links.items() for path, e in expressions(link)]
     found += [(f"fluid.flow.{number}", e) for number, e in enumerate(case.fluid.flow or ())]
     told = set()
     for path, expression in found:
@@ -118,3 +119,6 @@ def _driven(case: Case) -> Iterator[str]:
         if "t" in expression.variables and key not in told:
             told.add(key)
             yield f"{key}: found a function of t; allowed: constants; rests and modes are of what does not change"
+    for name, link in case.links.items():
+        if link.resists_rates:
+            yield f"link.{name}: found what answers to rates; allowed: no damping, no motors; modes do not have it"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..io.snapshots import FilamentSnapshot, Snapshot
+from ..io.snapshots import FilamentSnapshot, LinkSnapshot, Snapshot
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
@@ -63,7 +63,11 @@ class Diagnostics:
                 **self._twisting(description, now, where),
             )
         grid = self._output.evaluate(configuration, self._pushed(now), now.state.time, fields) if fields else None
-        return Snapshot(now.state.time, filaments, self._of_all(now), grid)
+        links = {}
+        for link in self._rods.links:
+            seen = link.seen(configuration, now.state.time)
+            links[link.name] = LinkSnapshot(seen.first, seen.second, seen.force, **seen.parts)
+        return Snapshot(now.state.time, filaments, self._of_all(now), grid, links)
 
     def _twisting(self, filament: Filament, now: SolvedState, where: slice) -> dict[str, np.ndarray]:
         """The twist torque and the spin (N, 3) of a filament that twists, by name."""

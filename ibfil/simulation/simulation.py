@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import CaseError, RunFailed
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
+from ..rods.rates import Accepted
 from ..timestepping.base import FAILURES, State, Step
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import Verdict
@@ -212,6 +213,7 @@ class Simulation:
             self.state_now = self.state_now._replace(dt_old=0.0)
             self._control.restart()
         self.fluid.advance(step.response, step.velocity, step.force)
+        self.system.advance(Accepted(time, time - before.time, step.state.configuration))
         self._look_at_crossing(time - before.time)
         self._look_at_growth(time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
@@ -340,6 +342,7 @@ class Simulation:
             **{f"control_{key}": value for key, value in self._control.state().items()},
             **{f"limits_{key}": value for key, value in self.limits.state().items()},
             **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
+            **{f"rods_{key}": value for key, value in self.system.memory().items()},
             **({} if self.model.noise is None else {"random": self.model.noise.state()}),
             **self.rods.contact.state(),
             **({"laws": self._laws} if self._laws else {}),
@@ -361,15 +364,17 @@ class Simulation:
         self.state_now = State(number["time"], configuration, array["y_old"], number["dt_old"])
         self._last = (array["velocity"], array["force"], array["reaction"])
         self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
-        control = {k.removeprefix("control_"): v for k, v in (array | number).items() if k.startswith("control_")}
+        known: dict[str, np.ndarray | float] = {**array, **number}
+        control = {k.removeprefix("control_"): v for k, v in known.items() if k.startswith("control_")}
         self._control.restore(control)
         self.limits.restore({k.removeprefix("limits_"): v for k, v in number.items() if k.startswith("limits_")})
-        memory = {k.removeprefix("fluid_"): v for k, v in (array | number).items() if k.startswith("fluid_")}
+        memory = {k.removeprefix("fluid_"): v for k, v in known.items() if k.startswith("fluid_")}
         if memory:
             self.fluid.recall(memory)
+        self.system.recall({k.removeprefix("rods_"): v for k, v in known.items() if k.startswith("rods_")})
         if self.model.noise is not None:
             self.model.noise.restore(str(state["random"]))
-        self.rods.contact.restore({**array, **number})
+        self.rods.contact.restore(known)
 
     def _same_start(self, began: np.ndarray) -> None:
         """Clamps and tethers hold the start shape, so it must be the one the run began with."""

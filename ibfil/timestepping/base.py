@@ -67,6 +67,9 @@ class System(Protocol):
     ) -> Stiffness:
         """The same without compressive geometric stiffness, the part that may make it indefinite."""
 
+    def begin(self, tau: float, w: float) -> None:
+        """A step of effective length tau begins: what answers to rates is told."""
+
     def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""
 

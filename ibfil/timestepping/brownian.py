@@ -109,6 +109,7 @@ class Trapezoid:
         The force of the step is what the rods do to the fluid: f + K y/2 and reactions, the fluid's kicks not in it.
         """
         middle = state.time + 0.5 * dt
+        system.begin(0.5 * dt, 0.0)
         force, inner = system.forces(state.configuration, middle)
         matrix = system.stiffness(state.configuration, state.configuration, inner, middle)
         kicks = self.noise.force(state.configuration, dt)

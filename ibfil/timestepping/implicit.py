@@ -78,6 +78,7 @@ class Implicit:
         w = dt / state.dt_old if self.order == 2 and state.dt_old > 0 else 0.0
         tau, target = dt * (1 + w) / (1 + 2 * w), (w * w / (1 + 2 * w)) * state.y_old
         after, ahead = state.time + dt, w * state.y_old
+        system.begin(tau, w)
         there = system.move(state.configuration, ahead) if w else state.configuration
         equation = _Equation(
             system,

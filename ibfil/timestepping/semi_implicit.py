@@ -22,6 +22,7 @@ class SemiImplicit:
     def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
         """One force, one stiffness, one linear solve."""
         after = state.time + dt
+        system.begin(dt, 0.0)
         force, inner = system.forces(state.configuration, after)
         matrix = system.definite_stiffness(state.configuration, state.configuration, inner, after)
         zero = np.zeros(force.shape)

@@ -104,6 +104,9 @@ class SteadyRods:
         """The Jacobian of the forces."""
         return self.system.stiffness(configuration, start, moment, self.time)
 
+    def begin(self, tau: float, w: float) -> None:
+        """Nothing: where rods are at rest in their frame nothing has a rate."""
+
     def definite_stiffness(self, configuration: Configuration, start: Configuration, moment, time: float) -> Stiffness:
         """The same without compressive geometric stiffness."""
         return self.system.definite_stiffness(configuration, start, moment, self.time)

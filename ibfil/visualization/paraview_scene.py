@@ -62,8 +62,16 @@ shown = Show(tubes, view)
 ColorBy(shown, ("POINTS", "tension"))
 bar(tubes, shown, {tension!r}, 0.05)
 """
+_LINKS = """
+links = ExtractBlock(registrationName="links", Input=run, Selectors=["/Root/Block1"])
+joined = Show(links, view)
+joined.LineWidth = 2.0
+ColorBy(joined, ("POINTS", "link_force"))
+GetColorTransferFunction("link_force").ApplyPreset("Inferno (matplotlib)", True)
+bar(links, joined, {link!r}, 0.35)
+"""
 _FLOW = """
-flow = ExtractBlock(registrationName="flow", Input=run, Selectors=["/Root/Block1"])
+flow = ExtractBlock(registrationName="flow", Input=run, Selectors=["/Root/Block{block}"])
 slice1 = Slice(registrationName="slice", Input=flow, SliceType="Plane")
 slice1.SliceType.Origin, slice1.SliceType.Normal = CENTRE, NORMAL
 sheet = Show(slice1, view)
@@ -124,14 +132,16 @@ def write_scene(collection: Path, run: RunFile) -> Path:
     }
     rods = (
         'rods = ExtractBlock(registrationName="rods", Input=run, Selectors=["/Root/Block0"])'
-        if run.grid
+        if run.grid or run.links
         else "rods = run"
     )
     time = "time {time:.6g}" + ("" if units.time == "1" else f" {units.time}")
     text = _HEAD.format(**words) + rods
     text += _RODS.format(tension=_labelled("tension", units.force))
+    if run.links:
+        text += _LINKS.format(link=_labelled("force of links", units.force))
     if flow:
-        text += _FLOW.format(speed=_labelled("speed", run.units("grid/velocity")))
+        text += _FLOW.format(speed=_labelled("speed", run.units("grid/velocity")), block=2 if run.links else 1)
     text += _TAIL.replace("{clock}", repr(time))
     text += f"{_MARK}{zlib.crc32(text.encode()):08x}\n"
     if path.exists() and (path.read_bytes() == text.encode() or not _is_as_written(path)):

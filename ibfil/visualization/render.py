@@ -146,10 +146,12 @@ class _Pictures:
             "glyphs": f"longest arrow: {self.fastest:.3g}, length as the root of the speed",
             "streamlines": "flow along the plane through the middle",
         }.get(wish.flow, _of_thickness(run))
+        strongest = _strongest(run)
+        note = "; ".join(word for word in (note, _of_links(run, strongest)) if word)
         title = " ".join(run.case.title.split()) or run.path.stem
         pixel = 2 * self.frame.half / size[1]
         self.words = Words(title, tuple(bars), run.case.units.length, pixel, note)
-        self.stage = Stage(run, self.frame, size)
+        self.stage = Stage(run, self.frame, size, strongest)
         height = fluid_model(run.case).wall
         if height is not None:
             self.stage.wall(height)
@@ -181,6 +183,20 @@ class _Pictures:
     def close(self) -> None:
         """Give the window back."""
         self.stage.close()
+
+
+def _strongest(run: Run) -> float:
+    """The largest force of an element of any link in the run; 0 where there is none."""
+    forces = (np.asarray(columns["force"]) for columns in run.links.values())
+    return max((float(np.max(np.linalg.norm(force, axis=2))) for force in forces), default=0.0)
+
+
+def _of_links(run: Run, strongest: float) -> str:
+    """The note on the colour of links."""
+    if not run.links:
+        return ""
+    units = "" if run.case.units.force == "1" else f" {run.case.units.force}"
+    return f"links: the darker the larger their force, black at {strongest:.3g}{units}"
 
 
 def _of_thickness(run: Run) -> str:

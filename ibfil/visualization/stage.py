@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.meshes import filament_data
+from ..analysis.meshes import filament_data, link_lines
 from .camera import Viewpoint
 from .streamlines import evenly_spaced
 
@@ -21,6 +21,7 @@ SIDES = 24  # of a tube
 MARGIN = 1.12  # of what the filaments reach
 TIMES = "viridis"  # all eyes can order it
 FLOW = "Greys"
+LINKS = "Greys"
 ARROWS = 26  # along the width of a picture
 SHEET = 160  # points along the width of a slice
 LINES_APART = 7  # of these points, between two streamlines
@@ -72,10 +73,11 @@ def frame_for(look: Viewpoint, positions: list[np.ndarray], radius: float, size:
 class Stage:
     """A plotter that shows one moment after the other."""
 
-    def __init__(self, run: Run, frame: Frame, size: tuple[int, int]) -> None:
+    def __init__(self, run: Run, frame: Frame, size: tuple[int, int], strongest: float) -> None:
+        """``strongest``: the force of links that is black."""
         import pyvista
 
-        self._run, self._frame = run, frame
+        self._run, self._frame, self._strongest = run, frame, strongest
         plotter: Any = pyvista.Plotter  # whose types mypy cannot follow
         self._plotter = plotter(off_screen=True, window_size=list(size), lighting="three lights")
         self._plotter.set_background("white")
@@ -111,6 +113,7 @@ class Stage:
         mesh = self._mesh(output)
         mesh["shown"] = np.asarray(quantity(mesh, scale.name), float)
         self._add(mesh, scale, "rods")
+        self._links(output)
 
     def shape(self, output: int, scale: Scale) -> bool:
         """One of many shapes in the same picture, coloured by its time, later ones in front; whether it is to scale."""
@@ -122,6 +125,25 @@ class Stage:
         mesh.points += 3 * thin * output * self._frame.look.towards
         self._add(mesh, scale, f"shape {output}")
         return to_scale
+
+    def _links(self, output: int) -> None:
+        """The links as lines, the darker the larger their force."""
+        import pyvista
+
+        if not self._run.links:
+            return
+        lines, largest = pyvista.wrap(link_lines(self._run.snapshot(output))), max(self._strongest, 1e-300)
+        self._plotter.add_mesh(
+            lines,
+            scalars="link_force",
+            cmap=LINKS,
+            clim=(-0.4 * largest, largest),  # so that a link without force is seen on white
+            show_scalar_bar=False,
+            line_width=2.5,
+            lighting=False,
+            name="links",
+            reset_camera=False,
+        )
 
     def _add(self, mesh: pyvista.PolyData, scale: Scale, name: str) -> None:
         self._plotter.add_mesh(

@@ -1,7 +1,8 @@
 """A run as ParaView files.
 
-One .pvd collection with the real times, a .vtp of all filaments for each output, a .vti for each grid field time, where
-there are both a .pvd of either alone, and a ready scene (paraview_scene.py).
+One .pvd collection with the real times, a .vtp of all filaments for each output and one of all links where there are
+any, a .vti for each grid field time, where there are several of these a .pvd of each alone, and a ready scene
+(paraview_scene.py).
 
 Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
 file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
@@ -23,7 +24,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..analysis.meshes import PLAIN, View, box_of, field_data, polylines, rods_of
+from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of
 from ..errors import CaseError
 from ..io.overwriting import VTK, refuse, replacing
 from ..io.reader import RunFile
@@ -73,6 +74,7 @@ class Collection:
         self.run, self.folder, self.view = run, folder, view
         self.path = folder / f"{run.stem}.pvd"
         self.filaments: Entries = []
+        self.links: Entries = []
         self.fields: Entries = []
         self._created = ""
 
@@ -83,14 +85,16 @@ class Collection:
                 allowed = "a run in a periodic box, which rft and free space have not"
                 raise CaseError([f"{self.run}: found --wrap or --images; allowed: {allowed}"])
             if run.created != self._created:
-                self.filaments, self.fields, self._created = [], [], run.created
+                self.filaments, self.links, self.fields, self._created = [], [], [], run.created
             self.folder.mkdir(parents=True, exist_ok=True)
             self._add_filaments(run)
             self._add_fields(run)
-            _write_collection(self.path, [self.filaments, self.fields])
-            if self.fields:  # each kind alone too: filters of lines, such as Tube, may crash ParaView upon a grid
-                _write_collection(self._alone("filaments"), [self.filaments])
-                _write_collection(self._alone("grid"), [self.fields])
+            kinds = {"filaments": self.filaments, "links": self.links, "grid": self.fields}
+            there = {name: entries for name, entries in kinds.items() if entries}
+            _write_collection(self.path, list(there.values()))
+            if len(there) > 1:  # each kind alone too: filters of lines, such as Tube, may crash ParaView upon a grid
+                for name, entries in there.items():
+                    _write_collection(self._alone(name), [entries])
             write_scene(self.path, run)
             return run.status == "running"
 
@@ -98,14 +102,19 @@ class Collection:
         return self.path.with_stem(f"{self.path.stem}_{kind}")
 
     def _add_filaments(self, run: RunFile) -> None:
-        """A .vtp for each output that is not there yet."""
+        """A .vtp for each output that is not there yet, and one of its links."""
         _keep_common(self.filaments, run.time)
+        _keep_common(self.links, run.time)
         rods, box = rods_of(run), box_of(run)
         done = len(self.filaments)
         for i, frame in enumerate(run.snapshots(done), done):
             file = f"{self.run.stem}_filaments_{i:06d}.vtp"
             _save(polylines(frame, rods, box, self.view), self.folder / file)
             self.filaments.append((frame.time, file))
+            if frame.links:
+                file = f"{self.run.stem}_links_{i:06d}.vtp"
+                _save(link_lines(frame), self.folder / file)
+                self.links.append((frame.time, file))
 
     def _add_fields(self, run: RunFile) -> None:
         """A .vti for each time at which fields were written."""

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ibfil.bench import many, parts, pieces, timing
+from ibfil.bench import linked, many, parts, pieces, timing
 from ibfil.errors import CaseError
 
 
@@ -19,6 +19,7 @@ from ibfil.errors import CaseError
         lambda: [pieces.table_pair("roma3", 1.0, 5)],
         lambda: [pieces.inertia(16)],
         lambda: pieces.swimmers(end=1e-3),
+        lambda: linked.linked(2, (1e9, None), nodes=8),
     ],
 )
 def test_pieces_give_finite_positive_numbers(rows, monkeypatch):

@@ -18,6 +18,18 @@ SPEED = ["observe.v.kind=speed"]
 THERMAL = ["thermal.energy=1"]
 EXPECT = [*SPEED, "expect.e.observe=v"]
 
+MIDDLE, LAB = "{filament='rod'}", "{point=[0, 0, 0]}"
+TWO = "filament.two={length=1, nodes=9, bending=1, stretching=1, position=[0, 1, 0]}"
+BOUND = [TWO, "link.k={kind='bind', filaments=['rod', 'two'], normal=1}"]
+
+
+def sprung(one: str, other: str) -> list[str]:
+    """A spring between two places."""
+    return [f"link.k={{stiffness=1, between=[{one}, {other}]}}"]
+
+
+SPRUNG = sprung(MIDDLE, LAB)
+
 # Overrides of a sound case, the key that is then at fault, and words of the sentence.
 COMBINATIONS = [
     # the rod
@@ -101,6 +113,30 @@ COMBINATIONS = [
     ([f"{ROD}.bending=[1, 2]", f"{ROD}.loads.weight=[0, 1, 1]"], f"{ROD}.loads.weight", "A1 != A2"),
     ([f"{ROD}.bending=[1, 2]", "fluid.flow=[0, 'z', 'y']"], "fluid.flow", "A1 != A2"),
     ([f"{ROD}.bending=[1, 2]", *THERMAL], "thermal.directions", "A1 != A2"),
+    # links
+    (sprung("{}", LAB), "link.k.between.0", "{ filament, at }, or { point }"),
+    (sprung("{filament='rod', point=[0, 0, 0]}", MIDDLE), "link.k.between.0", "a filament and a point"),
+    (sprung("{point=[1, 0, 0]}", LAB), "link.k.between", "two points"),
+    (sprung(MIDDLE, "{filament='rod', at='middle'}"), "link.k.between", "two different places"),
+    (sprung("{filament='rod', at=1.1}", LAB), "link.k.between.0.at", "0 to length = 1"),
+    (sprung(MIDDLE, "{at=1, point=[0, 0, 0]}"), "link.k.between.1.at", "with filament only"),
+    (sprung("{filament='rot'}", LAB), "link.k.between.0.filament", 'did you mean "rod"'),
+    ([*sprung(MIDDLE, LAB), "link.k.kind=hinge"], "link.k.between.1.point", 'kind = "spring" only'),
+    ([*BOUND, "link.k.filaments=['rod', 'rod']"], "link.k.filaments", "two different filaments"),
+    ([*BOUND, "link.k.filaments=['rod', 'odd']"], "link.k.filaments.1", "one of rod, two"),
+    ([*BOUND, "link.k.range=[0.5, 1.5]"], "link.k.range", "s2 <= length = 1"),
+    ([*BOUND, "link.k.range=[0.5, 0.2]"], "link.k.range", "s1 < s2"),
+    ([*BOUND, "link.k.offset=-1.5"], "link.k.offset", "lies beside none"),
+    ([*BOUND, "link.k.range=[0.6, 1]", "link.k.offset=0.5"], "link.k.offset", "between -1 and 0.4"),
+    ([*BOUND, "link.k.motor={friction=1, lag=0}"], "link.k.motor.lag", "> 0 where friction is"),
+    ([*BOUND, "link.k.motor={friction=1, lag=1}", "time.scheme=explicit"], "link.k.motor", "no rate within a step"),
+    ([*BOUND, "link.k.motor={friction=1, lag=1}", *THERMAL], "link.k.motor", "noise it would need"),
+    ([*SPRUNG, "link.k.damping=1", "time.scheme=explicit"], "link.k.damping", '"implicit" or "semi-implicit"'),
+    ([*SPRUNG, "link.k.damping=1", *THERMAL], "link.k.damping", "no damping"),
+    ([*BOUND, f"{ROD}.copies={{count=2, region=[[0, 0, 0], [1, 1, 1]]}}"], "link.k", '"rod_000" being the first'),
+    ([*SPRUNG, "observe.v={kind='link_tension', link='q'}"], "observe.v.link", "allowed: k"),
+    ([*SPRUNG, "observe.v={kind='link_tension'}"], "observe.v.link", "found nothing"),
+    ([*SPRUNG, "observe.v={kind='speed', link='k'}"], "observe.v.link", "only with kinds that look at a link"),
     # contact
     (["contact.action=stop"], "contact.distance", "a distance, or a radius"),
     (["contact={distance=1, strength=1}"], "contact.strength", "only with action"),

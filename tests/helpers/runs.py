@@ -61,6 +61,24 @@ position = [0.2, 0.1, 0.05]
 action = "warn"
 distance = 0.08
 """
+LINKED = """
+[filament.other]
+length = 1.0
+nodes = 9
+bending = 1.0
+stretching = 100.0
+radius = 0.05
+position = [0.0, 0.1, 0.05]
+[link.spring]
+between = [{ filament = "rod", at = 0.3 }, { filament = "other" }]
+stiffness = 20.0
+damping = 0.1
+[link.bound]
+kind = "bind"
+filaments = ["other", "rod"]
+normal = 100.0
+motor = { friction = 5.0, lag = 0.01 }
+"""
 
 
 def rod(*overrides: str, more: str = ""):
@@ -99,6 +117,7 @@ SCENES = {
     "thermal": (rod("thermal={energy=1e-3}", "time.step=1e-3"), real, (2, 7)),
     "thermal in the plane": (rod("thermal={energy=1e-3, directions='xy', twist=false}"), real, (1, 5)),
     "contact": (rod(*FLUIDS["table"], more=SECOND), real, (2, 7)),
+    **{f"linked, {fluid}": (rod(*FLUIDS[fluid], more=LINKED), real, (2, 7)) for fluid in ("rft", "krylov")},
 }
 
 

@@ -87,12 +87,15 @@ def walk(table: type[BaseModel], path: tuple[str, ...], scene: dict[str, Any]):
         inner = tables(hint)
         if get_origin(hint) is dict and tables(get_args(hint)[1]):
             entry = "rod" if name == "filaments" else "x"
-            (model,) = tables(get_args(hint)[1])
-            start = scene if entry == "rod" else put(scene, (*key, entry), needed(model))
-            yield from walk(model, (*key, entry), start)
+            for model in tables(get_args(hint)[1]):
+                start = scene if entry == "rod" else put(scene, (*key, entry), needed(model))
+                yield from walk(model, (*key, entry), start)
         elif get_origin(hint) is tuple and tables(get_args(hint)[0]):
             (model,) = tables(get_args(hint)[0])
-            yield from walk(model, (*key, "0"), put(scene, key, [needed(model)]))
+            if (info.examples or [None])[0]:
+                yield from walk(model, (*key, "0"), put(scene, key, info.examples[0]))
+            else:
+                yield from walk(model, (*key, "0"), put(scene, key, [needed(model)]))
         else:
             if name != "parameters":
                 yield Key(key, hint, (*said, *info.metadata), scene)

@@ -101,7 +101,7 @@ class ImmersedModel(FluidModel):
 
     def factor_cost(self, rods: RodStack) -> float:
         """The cost of factoring the rods' own systems, in velocity evaluations."""
-        factors = sum(costs.factored(where.stop - where.start, self.components) for where in rods.nodes)
+        factors = sum(costs.factored(count, self.components) for count in rods.group_sizes)
         return factors / self.evaluation(rods)
 
     def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
@@ -145,9 +145,7 @@ class ImmersedModel(FluidModel):
         out = {"mobility table": self._number * self.table_entries()}
         if method == "krylov":
             band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
-            out["preconditioner"] = (
-                sum(8.0 * (self.components * (w.stop - w.start)) ** 2 for w in rods.nodes) + 2 * band
-            )
+            out["preconditioner"] = sum(8.0 * (self.components * k) ** 2 for k in rods.group_sizes) + 2 * band
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
             out["dense matrices"] = costs.dense_bytes(n, self.components)

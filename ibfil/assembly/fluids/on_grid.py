@@ -73,7 +73,7 @@ class GridModel(ImmersedModel):
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
-        counts = [where.stop - where.start for where in rods.nodes]
+        counts = rods.group_sizes
         return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
 
     def evaluation(self, rods: RodStack) -> float:

@@ -39,9 +39,16 @@ class ResistiveForceModel(FluidModel):
         return DragOutput(fluid)
 
     def terms(self, rods: RodStack, memory: Mapping[str, float], step: float) -> list[Term]:
-        """Drag alone."""
-        n = len(rods.s)
-        return [Term("drag of each node", _DRAG * costs.of_rods(self.case, n), 8.0 * 3 * n)]
+        """Drag, and the factors of what links couple."""
+        n, m = len(rods.s), rods.system.unknowns
+        out = [Term("drag of each node", _DRAG * costs.of_rods(self.case, n), 8.0 * 3 * n)]
+        if not rods.links:
+            return out
+        from ...linalg.block_sparse import pattern
+
+        found = pattern(rods.system.profile, *rods.linked)
+        seconds = costs.of_factors(self.case, found.operations, m)
+        return [*out, Term("factors of linked nodes", seconds, 8.0 * m * m * len(found.column))]
 
     def drag(self, filament: Filament) -> float:
         """The case's own, across."""

@@ -15,6 +15,7 @@ from ..filament import copy_name, single
 from ..fluid import Coefficients, Fluid, Matched
 from ..schema import Observe, Scene
 from .filament import check_filament
+from .links import check_links
 from .sheet import check_sheet
 from .size import check_size
 from .space import check_space
@@ -32,6 +33,7 @@ def check(case: Scene) -> Iterator[Fault]:
     for part in (
         check_size,
         _one_force,
+        check_links,
         _contact,
         _fluid,
         check_space,
@@ -212,7 +214,9 @@ def _observe(case: Scene) -> Iterator[Fault]:
 
 def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
     filament = single(case.filaments, entry.filament)
-    if filament is None and entry.filament in case.filaments:
+    if entry.of_link or entry.link:
+        yield from _of_link(key, entry, case)
+    elif filament is None and entry.filament in case.filaments:
         if not entry.together:
             found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
             yield Fault(f"{key}.filament", found, f'a copy by its name, "{name}" being the first', ("filament",))
@@ -231,6 +235,17 @@ def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
     if (entry.kind == "diffusion_ratio") != (entry.interval > 0.0):
         found = f'{entry.interval:g} with kind = "{entry.kind}"'
         yield Fault(f"{key}.interval", found, "> 0 with diffusion_ratio, and only there", (f"{key}.kind",))
+
+
+def _of_link(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
+    """A link is named where it is looked at, and only there."""
+    if not entry.of_link:
+        found = f'{shown(entry.link)} with kind = "{entry.kind}"'
+        yield Fault(f"{key}.link", found, "only with kinds that look at a link", (f"{key}.kind",))
+    elif entry.link not in case.links:
+        found = shown(entry.link) + suggestion(entry.link, case.links) if entry.link else "nothing"
+        known = ", ".join(case.links) or "a [link.NAME], of which there is none"
+        yield Fault(f"{key}.link", found, known, ("link",))
 
 
 def _scalar(key: str, name: str, case: Scene) -> Iterator[Fault]:

@@ -1,7 +1,7 @@
 """The quantities of a scene that are prescribed in time, and their windows of rates, jumps and period.
 
-Every expression of a filament or of the flow that uses t drives, be it a strain, an end's motion, a load or a law: they
-are found by walking the case. An end that spins drives whatever its rate.
+Every expression of a filament, a link or the flow that uses t drives, be it a strain, an end's motion, a load or a
+law: they are found by walking the case. An end that spins drives whatever its rate.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...case.expressions import Expression, Tree, of_tree
-from ...case.walk import expressions
+from ...case.table import expressions
 from .intervals import bounds
 from .periods import Period, Sampled, common_period, repeats
 from .windows import Windows, windows
@@ -58,6 +58,11 @@ class Drivers:
                     near = _near(self._model, where) if expression.variables & {"x", "y", "z"} else {"s": s}
                     largest = 1.0 if path in _ANGLES else np.inf
                     out.append(Drive(prefix + path, expression.tree, _used(expression, near), largest))
+        s = np.linspace(0.0, max(f.length for f in self._model.case.filaments.values()), PLACES)
+        for name, link in self._model.case.links.items():
+            for path, expression in expressions(link):
+                if "t" in expression.variables:
+                    out.append(Drive(f"link.{name}.{path}", expression.tree, _used(expression, {"s": s})))
         for k, component in enumerate(self._model.case.fluid.flow or ()):
             if "t" in component.variables:
                 near = _near(self._model, slice(None))
@@ -90,12 +95,17 @@ class Drivers:
     def rate(self, begin: float, end: float, spins: bool = True) -> float:
         """The fastest rate (radians a time) of all that changes between two times; of ``spins`` too, or not."""
         found = (one.rate(begin, end) for key, one in self.windows.items() if spins or not key.endswith(_SPINNING))
-        return max(found, default=0.0)
+        return max([self._response, *found])
+
+    @property
+    def _response(self) -> float:
+        """The rate at which links answer by themselves, as motors do with a lag."""
+        return max((1.0 / link.response_time for link in self._model.case.links.values()), default=0.0)
 
     @property
     def fastest(self) -> float:
         """The fastest of the whole run."""
-        return max((one.fastest for one in self.windows.values()), default=0.0)
+        return max([self._response, *(one.fastest for one in self.windows.values())])
 
     @cached_property
     def repeating(self) -> float:

@@ -1,0 +1,1 @@
+"""Links between rods: springs, hinges, and rods bound along their length."""
