@@ -32,7 +32,8 @@ def contact(
             assert filament.radius is not None
             thick = alone(filament.radius, here)
             radius = 0.5 * (thick[1:] + thick[:-1])
-        parts.append((first, here[:-1], here[1:], np.full(len(first), number), radius))
+        around = np.full(len(first), filament.length if filament.closed else 0.0)
+        parts.append((first, here[:-1], here[1:], np.full(len(first), number), radius, around))
     segments = Segments(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     box = np.zeros(3)
     if case.fluid.on_grid and case.fluid.sides is not None:

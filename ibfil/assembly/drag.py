@@ -61,9 +61,9 @@ def matching(case: Case, filament: Filament) -> Match | None:
 
 def drag(case: Case, stacked: RodStack) -> resistive_force.Drag:
     """The drag of every node: coefficients times control volumes."""
-    volume = stacked.system.mesh.volume
+    volume = stacked.system.volume
     out = resistive_force.Drag(*(np.zeros(len(volume)) for _ in range(3)))
-    for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
+    for filament, where in zip(stacked.filaments, stacked.ranges, strict=True):
         s = stacked.s[where]
         radius = None
         if filament.radius is not None:

@@ -124,10 +124,10 @@ def coupling(case: Case, stacked: RodStack) -> Coupling:
         return TRANSLATION
     from ..fluids.torque_coupling import TorqueCoupling, spin_mobility
 
-    volume, twists = stacked.system.mesh.volume, stacked.twists
+    volume, twists = stacked.system.volume, stacked.twists
     widest = twist_radius(case)
     radius = np.full(len(volume), widest)
-    for filament, where in zip(stacked.filaments, stacked.nodes, strict=True):
+    for filament, where in zip(stacked.filaments, stacked.ranges, strict=True):
         if filament.radius is not None:
             radius[where] = alone(filament.radius, stacked.s[where])
     spin = spin_mobility(radius, widest, case.fluid.slip, case.fluid.viscosity, volume)

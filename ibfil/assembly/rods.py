@@ -5,7 +5,8 @@ The fluid is assembled in assembly/fluids. Nothing is built that the case does n
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
@@ -60,6 +61,35 @@ class Placed(NamedTuple):
     e1: np.ndarray
     held: tuple[np.ndarray | None, ...]
 
+    def segmented(self, thermal: bool) -> Segmented:
+        """It for the stack. Equipartition asks for a symmetric stiffness, which order 2 has with ghost nodes."""
+        derivative = self.filament.derivative
+        ghost = thermal and derivative == 2
+        return Segmented(self.s, derivative, self.held[0], self.held[1], ghost, self.filament.closed)
+
+
+class _Stacked(NamedTuple):
+    """Where filaments are in the stack: the nodes of each, all its nodes with copies, the source of every node."""
+
+    nodes: list[slice]
+    ranges: list[slice]
+    source: np.ndarray
+
+    @classmethod
+    def of(cls, parts: list[Segmented]) -> _Stacked:
+        """Filaments one after the other."""
+        offsets = np.cumsum([0] + [len(part.source) for part in parts]).tolist()
+        ranges = [slice(a, b) for a, b in pairwise(offsets)]
+        nodes = [slice(w.start + p.phantoms, w.stop - p.phantoms) for w, p in zip(ranges, parts, strict=True)]
+        return cls(nodes, ranges, np.concatenate([p.source + a for p, a in zip(parts, offsets, strict=False)]))
+
+    def whole(self, values: list[np.ndarray]) -> np.ndarray:
+        """Values of the nodes of each filament (k, ..) as one of all (n, ..)."""
+        out = np.zeros((len(self.source), *values[0].shape[1:]))
+        for where, given in zip(self.nodes, values, strict=True):
+            out[where] = given
+        return out[self.source]
+
 
 def _place(case: Case) -> list[Placed]:
     """All filaments, copies one by one. Raises CaseError for shapes that cannot be made."""
@@ -103,25 +133,19 @@ def _clamp_tangents(filament: Filament, key: str, folder: Path) -> Tangents:
     return held[0], held[1]
 
 
-def _ends(filaments, nodes, unknowns: int) -> tuple[PrescribedEnds, np.ndarray]:
+def _ends(filaments, nodes, ranges, unknowns: int) -> tuple[PrescribedEnds, np.ndarray]:
     """The held unknowns, and the mask (n,) of end nodes that carry no moment."""
-    held, free = [], np.zeros(nodes[-1].stop, bool)
+    held, free = [], np.zeros(ranges[-1].stop, bool)
     idle: list[int] = []
-    for filament, where in zip(filaments, nodes, strict=True):
+    for filament, where, every in zip(filaments, nodes, ranges, strict=True):
         for end, node in ((filament.start, where.start), (filament.finish, where.stop - 1)):
-            free[node] = not end.clamped
+            free[node] = not end.clamped and not filament.closed
             if end.held:
                 moves = None if end.moves is None else triple(end.moves, "t")
                 held.append(PrescribedEnd(node, _turn(end), moves))
         if unknowns == 4 and filament.twisting is None:
-            idle += range(where.start, where.stop)
+            idle += range(every.start, every.stop)
     return PrescribedEnds(held, unknowns, np.array(idle, np.int64)), free
-
-
-def _segmented(placed: Placed, thermal: bool) -> Segmented:
-    """A filament for the stack. Equipartition asks for a symmetric stiffness, which order 2 has with ghost nodes."""
-    derivative = placed.filament.derivative
-    return Segmented(placed.s, derivative, placed.held[0], placed.held[1], thermal and derivative == 2)
 
 
 def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> RodStack:
@@ -133,21 +157,18 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
         raise CaseError([f"{case.file}: laws: found {name}; allowed: one of {', '.join(case.filaments)}"])
     placed = _place(case)
     filaments, positions = tuple(p.filament for p in placed), [p.r for p in placed]
-    offsets = np.cumsum([0] + [len(p.s) for p in placed]).tolist()
-    nodes = [slice(a, b) for a, b in pairwise(offsets)]
-    s = np.concatenate([p.s for p in placed])
-    mesh = stack([_segmented(p, case.thermal is not None) for p in placed])
+    parts = [p.segmented(case.thermal is not None) for p in placed]
+    stacked = _Stacked.of(parts)
+    nodes, ranges = stacked.nodes, stacked.ranges
+    s, mesh = stacked.whole([p.s for p in placed]), stack(parts)
+    for where, p in zip(nodes, placed, strict=True):
+        s[where] = p.s  # of the last node of a closed rod its length, not 0
     unknowns = 4 if any(f.twisting is not None for f in filaments) else 3
-    ends, free = _ends(filaments, nodes, unknowns)
+    ends, free = _ends(filaments, nodes, ranges, unknowns)
     own = [next((law for name, law in given.items() if case.filaments[name] is f), None) for f in filaments]
-    law = laws.law(filaments, nodes, s, mesh, own)
-    stretching = half(along(filaments, nodes, s, lambda f: f.stretching))
+    law = laws.law(filaments, ranges, s, mesh, own)
+    stretching = half(along(filaments, ranges, s, lambda f: f.stretching))
     length = min(f.length for f in filaments)
-    kind = RodSystem
-    if filaments[0].force == "torque-free":
-        from ..rods.torque_free import TorqueFree
-
-        kind = TorqueFree
     forces, names = loads(filaments, nodes, s, mesh, positions), tuple(p.name for p in placed)
     touching: Contact | NoContact = NoContact()
     if case.contact is not None:
@@ -155,13 +176,28 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
 
         touching = contact(case, names, filaments, nodes, s)
         forces += touching.loads()
+    r, e1 = stacked.whole(positions), stacked.whole([p.e1 for p in placed])
     joined: list[Link] = []
     if case.links:
         from .links import Held, links
 
         held = [Held(k, p.name, p.filament, where, p.s) for k, (p, where) in enumerate(zip(placed, nodes, strict=True))]
-        joined = links(case, held, np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
+        joined = links(case, held, r, e1)
         forces += joined
-    system = kind(mesh, law, stretching, free, ends, forces, unknowns, length)
-    start = system.start(np.concatenate(positions), np.concatenate([p.e1 for p in placed]))
-    return RodStack(names, filaments, tuple(nodes), s, system, start, touching, tuple(joined))
+    system = _kind(filaments, stacked)(mesh, law, stretching, free, ends, forces, unknowns, length)
+    start = system.start(r, e1)
+    return RodStack(names, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined))
+
+
+def _kind(filaments: tuple[Filament, ...], stacked: _Stacked) -> Callable[..., RodSystem]:
+    """The class of the rods: open, closed or of the torque-free force."""
+    if filaments[0].force == "torque-free":
+        from ..rods.torque_free import TorqueFree
+
+        return TorqueFree
+    if not any(f.closed for f in filaments):
+        return RodSystem
+    from ..rods.closed import ClosedRods
+
+    closures = [(w.start, w.stop - 1) for f, w in zip(filaments, stacked.nodes, strict=True) if f.closed]
+    return partial(ClosedRods, source=stacked.source, closures=closures)

@@ -28,6 +28,7 @@ class RodStack:
     names: tuple[str, ...]
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
+    ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
     s: np.ndarray
     system: RodSystem
     start: Configuration
@@ -37,22 +38,22 @@ class RodStack:
     @cached_property
     def groups(self) -> tuple[tuple[slice, ...], ...]:
         """The node ranges of filaments that a preconditioner takes together: linked ones, while they are few nodes."""
-        group = list(range(len(self.nodes)))
-        nodes = [where.stop - where.start for where in self.nodes]
+        group = list(range(len(self.ranges)))
+        nodes = [where.stop - where.start for where in self.ranges]
         for link in self.links:
             one, other = (group[k] for k in (link.filaments[0], link.filaments[-1]))
             if one != other and nodes[one] + nodes[other] <= TOGETHER:
                 group = [one if k == other else k for k in group]
                 nodes[one] += nodes[other]
         members: dict[int, list[slice]] = {}
-        for k, where in zip(group, self.nodes, strict=True):
+        for k, where in zip(group, self.ranges, strict=True):
             members.setdefault(k, []).append(where)
         return tuple(tuple(ranges) for ranges in members.values())
 
     @cached_property
     def twists(self) -> np.ndarray:
         """Which nodes are of filaments that twist (n,): e1 of others may come to differ from node to node."""
-        return np.repeat([f.twisting is not None for f in self.filaments], [w.stop - w.start for w in self.nodes])
+        return np.repeat([f.twisting is not None for f in self.filaments], [w.stop - w.start for w in self.ranges])
 
     @property
     def linked(self) -> tuple[np.ndarray, np.ndarray]:
@@ -67,5 +68,6 @@ class RodStack:
 
     def locate(self, node: int) -> tuple[str, int]:
         """The filament that a node of the stack is of, and its number there."""
-        k = next(k for k, where in enumerate(self.nodes) if node < where.stop)
-        return self.names[k], node - self.nodes[k].start
+        k = next(k for k, where in enumerate(self.ranges) if node < where.stop)
+        where = self.nodes[k]
+        return self.names[k], min(max(node, where.start), where.stop - 1) - where.start

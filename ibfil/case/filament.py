@@ -228,6 +228,10 @@ class Filament(Table):
     start: End = Field(End(), description="the end at s = 0")
     finish: End = Field(End(), description="the end at s = L")
     loads: Loads | None = Field(None, description="loads per length")
+    closed: bool = Field(False, description="a ring: the last node is the first; the shape is scaled to length")
+    linking: Annotated[int, Whole(low=-10000)] | None = Field(
+        None, description="linking number of a closed filament that twists; absent: the one of least twist"
+    )
 
     @property
     def keeps_no_plane(self) -> bool:

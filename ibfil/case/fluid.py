@@ -24,6 +24,11 @@ class Contact(Table):
     distance: Positive | None = Field(None, description="distance of the axes at contact; absent: the sum of radii")
     strength: Positive = Field(1.0, description="repel: force at contact; the range is distance")
 
+    @property
+    def repels(self) -> bool:
+        """Whether it keeps filaments apart."""
+        return self.action == "repel"
+
 
 class Matched(Table):
     """Drag of a straight rod in the grid."""

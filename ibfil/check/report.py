@@ -65,6 +65,8 @@ def modelled(case: Case) -> list[str]:
             terms.append(f"{side} {end.end}")
             terms += [f"{row.words} at {side}" for row in named(ON_ENDS, end)]
             terms += [f"{words} at {side}" for key, words in _MOTIONS.items() if getattr(end, key) is not None]
+        if f.closed:
+            terms.append("closed" + ("" if f.linking is None else f", linking number {f.linking}"))
         terms += [row.words for row in named(ALONG, f.loads)]
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     out += [f"link {name}: {link.words}" for name, link in case.links.items()]

@@ -10,18 +10,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..case.shape import RunShape
+from ..case.table import expressions
 from ..shapes import initial
 from ..simulation import steps
 from .dimensionless import of_filament, oscillations
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
+    from ..case.schema import Case
     from ..simulation.simulation import Simulation
 
 
 SLOWED, DAMPED = 0.02, 0.2  # by which steps may change omega, and the decay, of a rod's own oscillation
 FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
 QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
+JUMP = 1e-6  # of the larger value: a difference between the ends of a closed rod that is none
 STRAINED = 1e-6  # of the length of a filament: strain of a link at the start that is none
 STIFF = 1e6  # stiffness of a link times the step over the drag of a node: beyond it Krylov's forces drift
 THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
@@ -37,6 +40,8 @@ def warnings(simulation: Simulation) -> list[str]:
         out += _of_inertia(simulation, name, filament)
         where = simulation.nodes(name)
         out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
+        if filament.closed:
+            out += _of_closed(key, filament, case)
     return out + _of_given_step(simulation) + _of_links(simulation) + _of_run(simulation) + fluid.warnings(simulation)
 
 
@@ -51,6 +56,24 @@ def _of_given_step(simulation: Simulation) -> list[str]:
         steps.OWN: simulation.growth_rate(),
     }
     return [steps.too_long(dt, what, rate) for what, rate in rates.items() if steps.is_long(dt, rate)]
+
+
+def _of_closed(key: str, filament: Filament, case: Case) -> list[str]:
+    """Values along a closed rod that do not close, and strands that may pass through each other."""
+    out: list[str] = []
+    for path, expression in expressions(filament):
+        if not path.startswith("shape.") and "s" in expression.variables:
+            given = dict.fromkeys(expression.variables - {"s"}, 0.0)
+            one, other = (expression.at(s=s, **given) for s in (0.0, filament.length))
+            if abs(one - other) > JUMP * max(abs(one), abs(other)):
+                found = f"{one:.3g} at s = 0 and {other:.3g} at s = length, which are one node of a closed rod"
+                out.append(f"{key}.{path}: {found}; a function of s that closes")
+    if filament.twisting is not None and (case.contact is None or not case.contact.repels):
+        out.append(
+            f"{key}.closed: strands that meet may pass through each other, each time with a change of the linking "
+            'number by 2; contact.action = "repel" keeps them apart'
+        )
+    return out
 
 
 def _of_links(simulation: Simulation) -> list[str]:

@@ -19,7 +19,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
 
     Raises CaseError, a line for each observable or stop rule that asks for what its kind does not have.
     """
-    from . import fitted, linked, local, together  # noqa: F401  (they fill KINDS)
+    from . import closed, fitted, linked, local, together  # noqa: F401  (they fill KINDS)
     from .stop_rules import stop_faults
 
     made: dict[str, Observable] = {}
@@ -39,7 +39,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
 
 def kinds_text() -> str:
     """The kinds of observables and their keys, for `ibfil schema`."""
-    from . import fitted, linked, local, together  # noqa: F401  (they fill KINDS)
+    from . import closed, fitted, linked, local, together  # noqa: F401  (they fill KINDS)
 
     lines = ["The kinds of [observe.NAME]: what each takes at an output, or of the run, and the keys it has"]
     for name, kind in KINDS.items():

@@ -35,7 +35,8 @@ class Mesh(NamedTuple):
 class Segmented(NamedTuple):
     """One filament before stacking: arclength of its nodes, derivative order, tangents of clamped ends (or None).
 
-    ``ghost``: r'' at clamps by ``ghost_weights``.
+    ``ghost``: r'' at clamps by ``ghost_weights``. ``closed``: the last node is the first, and ``phantoms`` copies of
+    the nodes beyond stand before and after (closed.py), so that every stencil within is central.
     """
 
     s: np.ndarray
@@ -43,6 +44,24 @@ class Segmented(NamedTuple):
     start_tangent: np.ndarray | None
     finish_tangent: np.ndarray | None
     ghost: bool = False
+    closed: bool = False
+
+    @property
+    def phantoms(self) -> int:
+        """How many copies stand before the first node, and as many after the last."""
+        return self.derivative // 2 if self.closed else 0
+
+    @property
+    def whole(self) -> np.ndarray:
+        """The arclength of all nodes, copies beyond the ends included."""
+        g, s = self.phantoms, self.s
+        return s if g == 0 else np.concatenate([s[-1 - g : -1] - s[-1], s, s[1 : g + 1] + s[-1]])
+
+    @property
+    def source(self) -> np.ndarray:
+        """The node that each of all nodes is, by number: itself, but for copies."""
+        count, g = len(self.s), self.phantoms
+        return (np.arange(count + 2 * g) - g) % (count - 1) + g if self.closed else np.arange(count)
 
 
 def _stencils(s: np.ndarray, derivative: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -83,18 +102,25 @@ def stack(filaments: Sequence[Segmented]) -> Mesh:
     columns: list[list[np.ndarray]] = [[] for _ in Mesh._fields]
     offset = 0
     for f in filaments:
-        n = len(f.s)
-        first, w1, w2 = _stencils(f.s, f.derivative)
+        s, g = f.whole, f.phantoms
+        n = len(s)
+        first, w1, w2 = _stencils(s, f.derivative)
+        if f.closed:  # to the last bit
+            last = n - 1 - g
+            shift = (last - first[last]) - (g - first[g])
+            w1[last], w2[last] = np.roll(w1[g], shift), np.roll(w2[g], shift)
         c1, c2 = np.zeros((n, 3)), np.zeros((n, 3))
         for end, tangent in ((0, f.start_tangent), (-1, f.finish_tangent)):
             if tangent is not None:
                 _clamp(f.s, end, tangent, f.ghost, (first, w1, w2, c1, c2))
-        segment = np.diff(f.s)
-        volume = 0.5 * (np.append(segment, 0.0) + np.append(0.0, segment))
+        joined = (np.arange(n) >= g) & (np.arange(n) < n - 1 - g)
+        segment = np.append(np.diff(s), 1.0)
+        there = np.where(joined, segment, 0.0)
+        volume = 0.5 * (there + np.append(0.0, there[:-1]))
         pad = ((0, 0), (0, width - w1.shape[1]))
         parts = (
-            np.append(np.ones(n - 1, bool), False),
-            np.append(segment, 1.0),
+            joined,
+            np.where(joined, segment, 1.0),
             volume,
             first + offset,
             np.pad(w1, pad),

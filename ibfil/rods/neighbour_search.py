@@ -22,6 +22,7 @@ class Segments(NamedTuple):
     end: np.ndarray  # (k,) that of the next node
     rod: np.ndarray  # (k,) number of the filament
     radius: np.ndarray  # (k,) two touch at the sum of theirs
+    around: np.ndarray  # (k,) the length of the rod where it is closed, else 0
 
 
 class Pairs(NamedTuple):
@@ -142,6 +143,9 @@ def _near(segments: Segments, r, u, middle, half, i, j, box, factor, margin, row
         return False
     if segments.rod[i] == segments.rod[j] and not moved:
         between = max(segments.begin[i], segments.begin[j]) - min(segments.end[i], segments.end[j])
+        if segments.around[i] > 0.0:  # the other way round a closed rod
+            widest = max(segments.end[i], segments.end[j]) - min(segments.begin[i], segments.begin[j])
+            between = min(between, segments.around[i] - widest)
         if between < np.pi * touch:
             return False
     row[0], row[1] = i, j

@@ -49,7 +49,17 @@ class RodSystem:
         self._zero = np.zeros(len(free))
         self._held = np.zeros(len(free), bool)
         self._held[ends.index[ends.index % unknowns < 3] // unknowns] = True
+        self.closures: tuple[tuple[int, int], ...] = ()  # the first and last node of closed rods (closed.py)
         self.remembering = tuple(part for part in (law, *loads) if isinstance(part, Remembering))
+
+    @property
+    def volume(self) -> np.ndarray:
+        """The control volume (n,) of each node in the fluid."""
+        return self.mesh.volume
+
+    def complete(self, y: np.ndarray) -> np.ndarray:
+        """y (n, m) with what the fluid does not know of: nothing but in closed rods."""
+        return y
 
     def start(self, r: np.ndarray, e1: np.ndarray) -> Configuration:
         """The configuration r (n, 3) with e1 (n, 3) made normal to the stencils' tangents."""

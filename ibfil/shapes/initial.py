@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from ..case.shape import Noise
 
 
+_MOST_TURN = 0.5  # of e1 from node to node, of a closed rod
+
+
 def initial_shape(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:
     """Positions r (N, 3), in the case's length, and unit directors e1 (N, 3) at t = 0, in the lab frame.
 
@@ -54,9 +57,30 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
         r = r + _triple(filament.shape.perturb, f"{key}.shape.perturb")(s)
     if filament.shape.noise is not None:
         r = r + _noise(filament.shape.noise, filament, curve, s)
+    if filament.closed:
+        r, e1 = _closed(r, e1, filament, f"{key}.shape")
     same = np.nonzero(np.linalg.norm(np.diff(r, axis=0), axis=1) < 1e-12 * filament.length)[0]
     if len(same):
         raise CaseError([f"{key}.shape: nodes {same[0]} and {same[0] + 1} start at the same point"])
+    return r, e1
+
+
+def _closed(r: np.ndarray, e1: np.ndarray, filament: Filament, key: str) -> tuple[np.ndarray, np.ndarray]:
+    from .closing import closed_frame, closed_nodes
+
+    if isinstance(filament.shape, RunShape):
+        if np.linalg.norm(r[-1] - r[0]) > 1e-9 * filament.length:
+            raise CaseError([f"{key}.path: found a filament that is not closed; allowed: a closed one"])
+        return r, e1
+    try:
+        r = closed_nodes(r, filament.length)
+    except ValueError as error:
+        raise CaseError([f"{key}: found a shape that does not close: {error}; allowed: with closed, less"]) from None
+    e1, turns = closed_frame(r, e1[0], filament.linking)
+    step = 2.0 * np.pi * abs(turns) / (filament.nodes - 1)
+    if filament.twisting is not None and step > _MOST_TURN:
+        found = f"{key.removesuffix('.shape')}.linking: found a turn by {step:.2g} from node to node"
+        raise CaseError([f"{found}; allowed: at most {_MOST_TURN:g}: more nodes, or less twist"])
     return r, e1
 
 

@@ -119,6 +119,9 @@ def _driven(case: Case) -> Iterator[str]:
         if "t" in expression.variables and key not in told:
             told.add(key)
             yield f"{key}: found a function of t; allowed: constants; rests and modes are of what does not change"
+    for name, filament in case.filaments.items():
+        if filament.closed:
+            yield f"filament.{name}.closed: found true; allowed: rods with ends; rests and modes are not of closed ones"
     for name, link in case.links.items():
         if link.resists_rates:
             yield f"link.{name}: found what answers to rates; allowed: no damping, no motors; modes do not have it"

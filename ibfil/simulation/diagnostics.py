@@ -91,7 +91,10 @@ class Diagnostics:
         thirds = []
         for half in (moment.twist, configuration.twist):
             half = np.where(mesh.joined, half, 0.0)
-            thirds.append((half + np.append(0.0, half[:-1])) / beside)
+            nodal = (half + np.append(0.0, half[:-1])) / np.maximum(beside, 1.0)
+            for first, last in self._mechanics.closures:
+                nodal[[first, last]] = 0.5 * (nodal[first] + nodal[last])
+            thirds.append(nodal)
         nodal = np.column_stack([moment.bend, thirds[0]])
         for load in self._mechanics.loads:
             given = load.end_moment(configuration, state.time)

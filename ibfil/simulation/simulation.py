@@ -368,8 +368,7 @@ class Simulation:
         control = {k.removeprefix("control_"): v for k, v in known.items() if k.startswith("control_")}
         self._control.restore(control)
         self.limits.restore({k.removeprefix("limits_"): v for k, v in number.items() if k.startswith("limits_")})
-        memory = {k.removeprefix("fluid_"): v for k, v in known.items() if k.startswith("fluid_")}
-        if memory:
+        if memory := {k.removeprefix("fluid_"): v for k, v in known.items() if k.startswith("fluid_")}:
             self.fluid.recall(memory)
         self.system.recall({k.removeprefix("rods_"): v for k, v in known.items() if k.startswith("rods_")})
         if self.model.noise is not None:

@@ -67,6 +67,9 @@ class System(Protocol):
     ) -> Stiffness:
         """The same without compressive geometric stiffness, the part that may make it indefinite."""
 
+    def complete(self, y: np.ndarray) -> np.ndarray:
+        """y with the nodes that are copies of others as these are."""
+
     def begin(self, tau: float, w: float) -> None:
         """A step of effective length tau begins: what answers to rates is told."""
 
@@ -104,5 +107,6 @@ class Stepper(Protocol):
 def _finish(
     system: System, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Solution, count: int, response
 ) -> Step:
+    y = system.complete(y)
     new = State(state.time + dt, system.move(state.configuration, y), y, dt)
-    return Step(new, velocity, answer.force, answer.reaction, count, response)
+    return Step(new, system.complete(velocity), answer.force, answer.reaction, count, response)

@@ -94,7 +94,7 @@ class SteadyRods:
     def __init__(self, system: RodSystem, time: float) -> None:
         self.system, self.time, self.length = system, time, system.length
         self._held = Prescribed(system.ends.index, np.zeros(system.ends.index.size))
-        self.move, self.turned = system.move, system.turned
+        self.move, self.turned, self.complete = system.move, system.turned, system.complete
 
     def forces(self, configuration: Configuration, time: float):
         """Nodal forces (n, m), and what ``stiffness`` needs to go with them."""

@@ -28,6 +28,7 @@ def sprung(one: str, other: str) -> list[str]:
     return [f"link.k={{stiffness=1, between=[{one}, {other}]}}"]
 
 
+CLOSED = [f"{ROD}.closed=true", f"{ROD}.shape={{kind='circle', curvature='2*pi'}}"]
 SPRUNG = sprung(MIDDLE, LAB)
 
 # Overrides of a sound case, the key that is then at fault, and words of the sentence.
@@ -113,6 +114,29 @@ COMBINATIONS = [
     ([f"{ROD}.bending=[1, 2]", f"{ROD}.loads.weight=[0, 1, 1]"], f"{ROD}.loads.weight", "A1 != A2"),
     ([f"{ROD}.bending=[1, 2]", "fluid.flow=[0, 'z', 'y']"], "fluid.flow", "A1 != A2"),
     ([f"{ROD}.bending=[1, 2]", *THERMAL], "thermal.directions", "A1 != A2"),
+    # closed filaments
+    ([f"{ROD}.linking=1"], f"{ROD}.linking", "without closed = true"),
+    ([*CLOSED, f"{ROD}.linking=1"], f"{ROD}.linking", "1 without twisting"),
+    (
+        [*CLOSED, *TWISTED, f"{ROD}.linking=1", f"{ROD}.shape={{kind='run', path='r.h5'}}"],
+        f"{ROD}.linking",
+        "of the run",
+    ),
+    ([*CLOSED, f"{ROD}.start.end=clamped"], f"{ROD}.start", "it has no ends"),
+    ([*CLOSED, f"{ROD}.finish.force=[1, 0, 0]"], f"{ROD}.finish", "it has no ends"),
+    ([*CLOSED, f"{ROD}.nodes=9"], f"{ROD}.nodes", "at least 10 with closed = true"),
+    ([*CLOSED, f"{ROD}.derivative=2", f"{ROD}.nodes=6"], f"{ROD}.nodes", "at least 7 with closed = true"),
+    ([*CLOSED, f"{ROD}.spacing=q**2"], f"{ROD}.spacing", '"even" with closed'),
+    ([*CLOSED, f"{ROD}.force=torque-free"], f"{ROD}.force", '"eq44"'),
+    ([*CLOSED, f"{ROD}.mass=1"], f"{ROD}.mass", "no inertia of closed"),
+    ([*CLOSED, f"{ROD}.shape.noise.amplitude=0.1"], f"{ROD}.shape.noise", "shape.perturb"),
+    (
+        [*CLOSED, *TWISTED, f"{ROD}.law={{kind='two-well', wells=[0, 1], barrier=1, gradient=1}}"],
+        f"{ROD}.law.gradient",
+        "0",
+    ),
+    ([*CLOSED, *THERMAL], f"{ROD}.closed", "no thermal noise of closed"),
+    ([*CLOSED, f"{ROD}.radius=0.1", "fluid.thick=true", "fluid.flow=['y', 0, 0]"], f"{ROD}.closed", "axis only"),
     # links
     (sprung("{}", LAB), "link.k.between.0", "{ filament, at }, or { point }"),
     (sprung("{filament='rod', point=[0, 0, 0]}", MIDDLE), "link.k.between.0", "a filament and a point"),

@@ -54,4 +54,4 @@ def suspension(seed, count, nodes, side, radius=0.02, length=0.5, wander=0.3):
     first = (np.arange(count)[:, None] * nodes + np.arange(nodes - 1)).ravel()
     s = np.tile(np.arange(nodes - 1), count) * length / (nodes - 1)
     rod = np.repeat(np.arange(count), nodes - 1)
-    return r, Segments(first, s, s + length / (nodes - 1), rod, radius * (1 + rod % 2))
+    return r, Segments(first, s, s + length / (nodes - 1), rod, radius * (1 + rod % 2), np.zeros(len(first)))

@@ -161,7 +161,7 @@ def test_neighbours_are_left_out_up_to_pi_times_the_distance():
     r = radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     ds = float(np.linalg.norm(r[1] - r[0]))
     k = np.arange(n - 1)
-    segments = Segments(k, k * ds, (k + 1) * ds, np.zeros(n - 1, np.int64), np.full(n - 1, 0.05))
+    segments = Segments(k, k * ds, (k + 1) * ds, np.zeros(n - 1, np.int64), np.full(n - 1, 0.05), np.zeros(n - 1))
     found = search(segments, r, OPEN, 10.0, 0.0)  # all of the ring is within ten times 0.1
     apart = (np.abs(found.i - found.j) - 1) * ds
     assert 0.1 * np.pi <= np.min(apart) < 0.1 * np.pi + ds
@@ -172,7 +172,7 @@ def test_a_rod_longer_than_its_box_meets_its_own_image():
     """Straight along x and a little askew: it comes back past its start after one box, 0.06 away."""
     r = np.column_stack([np.linspace(0, 1.4, 29), np.linspace(0, 0.084, 29), np.zeros(29)])
     k = np.arange(28)
-    segments = Segments(k, k * 0.05, (k + 1) * 0.05, np.zeros(28, np.int64), np.full(28, 0.04))
+    segments = Segments(k, k * 0.05, (k + 1) * 0.05, np.zeros(28, np.int64), np.full(28, 0.04), np.zeros(28))
     assert search(segments, r, OPEN, 1.0, 0.0).i.size == 0
     found = search(segments, r, np.array([1.0, 1.0, 1.0]), 1.0, 0.0)
     assert found.i.size > 0

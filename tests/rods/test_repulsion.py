@@ -21,7 +21,9 @@ def cross(ds: float, gap: float, distance: float = 1.0, offset: float = 0.0) -> 
     zero, k = 0 * s, np.arange(2 * half)
     r = np.concatenate([np.column_stack([s, zero, zero + gap]), np.column_stack([zero, s, zero])])
     begin, first = np.tile(s[:-1], 2), np.concatenate([k, k + len(s)])
-    segments = Segments(first, begin, begin + ds, np.repeat([0, 1], len(k)), np.full(2 * len(k), distance / 2))
+    segments = Segments(
+        first, begin, begin + ds, np.repeat([0, 1], len(k)), np.full(2 * len(k), distance / 2), np.zeros(2 * len(k))
+    )
     return ContactRepels(segments, ["one", "other"], [0, len(s)], np.zeros(3), 3.0), r
 
 
@@ -121,7 +123,7 @@ def test_the_stiffness_of_repulsion_is_the_derivative_of_its_force(name, definit
     """Central differences with h = 1e-6 err by some 1e-9 of the largest entry. ``definite``: it draws back only."""
     one, other, box = MEETINGS[name]
     r = np.array([*one, *other], float)
-    segments = Segments(np.array([0, 2]), np.zeros(2), np.array([1.0, 0.9]), np.arange(2), np.full(2, 0.1))
+    segments = Segments(np.array([0, 2]), np.zeros(2), np.array([1.0, 0.9]), np.arange(2), np.full(2, 0.1), np.zeros(2))
     sides = np.zeros(3) if box is None else np.array(box)
     asked = np.array([0]), np.array([1]), sides, 3.0
 

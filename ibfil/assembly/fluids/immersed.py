@@ -63,7 +63,7 @@ class ImmersedModel(FluidModel):
         from ...fluids import immersed_boundary
 
         case, space, eta = self.case, self.space, self.case.fluid.viscosity
-        volume = rods.system.mesh.volume
+        volume = rods.system.volume
         slip = immersed_boundary.slip_mobility(case.fluid.slip, self.kernel, space.spacing, eta, volume)
         local = rods.system.unknowns == 4 and not case.couples_torque
         spin = drag(case, rods).spin if local else None
@@ -161,7 +161,7 @@ class ImmersedModel(FluidModel):
         """4 pi eta across and 2 pi eta along, whatever the space; against spin the rods' own."""
         from ...fluids.resistive_force import Drag
 
-        eta, volume = self.case.fluid.viscosity, rods.system.mesh.volume
+        eta, volume = self.case.fluid.viscosity, rods.system.volume
         spin = drag(self.case, rods).spin if rods.system.unknowns == 4 else volume
         return Drag(4 * np.pi * eta * volume, 2 * np.pi * eta * volume, spin)
 

@@ -14,6 +14,7 @@ from ..faults import Fault, shown
 from ..filament import copy_name, single
 from ..fluid import Coefficients, Fluid, Matched
 from ..schema import Observe, Scene
+from .closed import check_closed
 from .filament import check_filament
 from .links import check_links
 from .sheet import check_sheet
@@ -33,6 +34,7 @@ def check(case: Scene) -> Iterator[Fault]:
     for part in (
         check_size,
         _one_force,
+        check_closed,
         check_links,
         _contact,
         _fluid,
