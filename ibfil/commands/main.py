@@ -19,9 +19,26 @@ from ..screen import let_go, lost, prepare, warn
 from ..version import __version__
 from . import bench, cases, check, new, render, run, schema, show, verify, vtk
 from .arguments import BAD_INPUT, CUT, FAILED
-from .studies import compare, stability, sweep, trade
+from .studies import compare, modes, rest, stability, sweep, trade
 
-COMMANDS = (run, check, new, cases, schema, show, vtk, render, sweep, trade, compare, stability, verify, bench)
+COMMANDS = (
+    run,
+    check,
+    new,
+    cases,
+    schema,
+    show,
+    vtk,
+    render,
+    sweep,
+    trade,
+    compare,
+    stability,
+    rest,
+    modes,
+    verify,
+    bench,
+)
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import platform
 import re
@@ -80,6 +81,18 @@ def _cell(value: Any) -> str:
 def shown(value: Any, digits: int = 4) -> str:
     """A cell for the eye."""
     return f"{value:.{digits}g}" if isinstance(value, float) else "" if value is None else str(value)
+
+
+def with_bar(value: float, bar: float | None, sign: str = "") -> str:
+    """A number with as many digits as its bar leaves known, and the bar with one or two; ``sign`` "+" writes both."""
+    if bar is None or not 0 < bar < float("inf"):
+        return f"{value:{sign}.5g}" + ("" if not bar else " +- not known")
+    digits = 1 if bar >= 3 * 10 ** math.floor(math.log10(bar)) else 2
+    decimals = digits - 1 - math.floor(math.log10(bar))
+    if -3 <= decimals <= 8:
+        return f"{value:{sign}.{max(decimals, 0)}f} +- {bar:.{max(decimals, 0)}f}"
+    size = max(abs(value), bar)
+    return f"{value:{sign}.{max(decimals + math.floor(math.log10(size)), 0)}e} +- {bar:.{digits - 1}e}"
 
 
 def write_json(path: Path, message: Mapping[str, Any]) -> None:

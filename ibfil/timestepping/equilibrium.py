@@ -18,16 +18,18 @@ from ..rods.system import RodSystem
 from .base import FAILURES, State
 from .implicit import Implicit
 from .linear_motion import LinearMotion
-from .spectrum import modes
+from .spectrum import Modes, modes
 from .steady import NoRest, SteadyFluid, SteadyRods
 
 _MOST = {"newton": 40, "continued": 400, "pushes": 4}  # steps
+_ALIKE = 1e-6  # of an eigenvalue: two that differ by less are one
+_SINGULAR = 1e-13  # reciprocal condition of a matrix of which only a part can be solved
 _PUSH = 0.02  # of the length, off a rest that is not stable
 _FLOOR = 100.0  # times the velocity that round-off makes: above, nothing is taken for a rest
 _PATIENCE = {"newton": 1, "continued": 3}  # steps below it in which the velocity must halve
 _LONGEST = 1e9  # T: a step of continuation after which a velocity that is left is there to stay
 _STRIDE = 0.3  # of the length, or radians between neighbours: the largest change in a step
-_GROWTH = (0.5, 10.0)  # of a step of continuation, by the ratio of residuals
+_GROWTH = (0.5, 10.0)  # of a step of continuation
 _ITERATIONS = 10  # of a step of continuation, else it is tried again with a quarter
 
 
@@ -63,8 +65,6 @@ def residual_of(velocity: np.ndarray, length: float, time: float) -> float:
 
 def newton(system: RodSystem, fluid: SteadyFluid, configuration: Configuration, time: float) -> Rest:
     """The rest next to ``configuration``, stable or not; ``time`` T is that of the slowest motion. Raises NoRest."""
-    from scipy.linalg import lstsq
-
     fall, steps = _Fall(_PATIENCE["newton"]), 0
     while True:
         motion = LinearMotion(system, fluid, configuration)
@@ -73,8 +73,20 @@ def newton(system: RodSystem, fluid: SteadyFluid, configuration: Configuration, 
             return Rest(fall.configuration, fall.best, steps, steps)
         if steps == _MOST["newton"] or not np.isfinite(residual):
             raise _none(motion.velocity, fall.best, steps)
-        y = motion.whole(lstsq(motion.matrix, -motion.residual, lapack_driver="gelsy")[0])
+        y = motion.whole(_solved(motion.matrix, -motion.residual))
         configuration, steps = _moved(system, configuration, y), steps + 1
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """x (k,) with A x = right, the smallest one that fits best where rods are free to drift."""
+    from scipy.linalg import lapack, lstsq
+
+    factors, pivots, failed = lapack.dgetrf(matrix)
+    condition = 0.0 if failed else lapack.dgecon(factors, np.abs(matrix).sum(axis=0).max())[0]
+    if condition < _SINGULAR:
+        out: np.ndarray = lstsq(matrix, right, lapack_driver="gelsy")[0]
+        return out
+    return lapack.dgetrs(factors, pivots, right)[0]
 
 
 def _change(system: RodSystem, y: np.ndarray) -> float:
@@ -107,13 +119,18 @@ def continued(system: RodSystem, fluid: SteadyFluid, configuration: Configuratio
         if fall.ended(residual, noise, state.configuration):
             return Rest(fall.configuration, fall.best, steps, solves)
         if np.isfinite(before):
-            tau *= float(np.clip(before / residual, *_GROWTH))
+            tau *= float(np.clip(_ratio(before, residual), *_GROWTH))
         if tau > _LONGEST * time:
             break
         before = residual
         state, tau, used = _step(steady, fluid, state, tau)
         solves += used
     raise _none(motion.velocity, fall.best, steps)
+
+
+def _ratio(before: float, residual: float) -> float:
+    """The ratio of a step to the last one: that of the residuals; where they rise, half an e-folding of their rise."""
+    return before / residual if residual <= before else 0.5 / float(np.log(residual / before))
 
 
 def _step(steady: SteadyRods, fluid: SteadyFluid, state: State, tau: float) -> tuple[State, float, int]:
@@ -156,8 +173,20 @@ def settled(system: RodSystem, fluid: SteadyFluid, configuration: Configuration,
             return Settled(tuple(rests), tuple(leading))
         if abs(leading[-1].imag) > zero:
             raise NoRest(f"it does not settle: {leading[-1]:.4g} grows and oscillates", 0)
-        configuration = _pushed(system, fluid, rest.configuration, found.vectors[:, :, 0].real, leading[-1].real)
+        vector = _towards(LinearMotion(system, fluid, configuration), found)
+        configuration = _pushed(system, fluid, rest.configuration, vector, leading[-1].real)
     raise NoRest(f"no stable rest after {_MOST['pushes']} pushes off unstable ones", 0)
+
+
+def _towards(came_from: LinearMotion, found: Modes) -> np.ndarray:
+    """The mode (n, m) that grows fastest; of several alike, and of its two ways, the one that the rods set out on."""
+    alike = np.abs(found.values - found.values[0]) <= _ALIKE * abs(found.values[0])
+    vectors = found.vectors[:, :, alike].real
+    columns = vectors[:, :3].reshape(-1, vectors.shape[2])
+    moves = [v[:, :3].ravel() for v in (came_from.velocity, came_from.noise)]
+    share, noise = np.linalg.lstsq(columns, np.array(moves).T, rcond=None)[0].T
+    along: np.ndarray = vectors @ share
+    return along if np.linalg.norm(share) > np.linalg.norm(noise) else vectors[:, :, 0]
 
 
 def zero_rate(motion: LinearMotion, time: float) -> float:

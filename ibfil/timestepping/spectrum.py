@@ -17,6 +17,7 @@ from .linear_motion import LinearMotion
 _TOLERANCE = (1e-10, 1e-7)  # of Arnoldi's eigenvalues: where A_G is zero, and where it comes from differences
 _SOLVED = 1e-9  # residual of the inner GMRES, which differences may keep from falling further
 _DENSE, _DENSE_STILL = 800, 250  # unknowns up to which the whole matrix is made; where the fluid is at rest
+_INVERSE, _OFF = 8, 1e-9  # inverse iterations; how far off an eigenvalue they are shifted, of it
 _APART = 0.01  # of a vector of length one: what must be left of it for another mode
 _RUNG, _RUNGS = 3.0, 3  # ratio of two shifts, and how many of them beyond the fastest growth
 
@@ -55,6 +56,25 @@ def leading_modes(motion: LinearMotion, count: int, rate: float) -> Modes:
         found = found.joined(_near(motion, count, shift))
         top = max(top, float(found.values.real.max()))
     return _sorted(motion, found.values, found.vectors)
+
+
+def followed(motion: LinearMotion, value: complex, vector: np.ndarray) -> tuple[complex, np.ndarray, float]:
+    """The mode next to a ``value`` and a ``vector`` (n, m) of a motion that differs little: value, vector, overlap.
+
+    By inverse iteration from the vector. The overlap of two modes is one where they are the same.
+    """
+    from scipy.linalg import lu_factor, lu_solve
+
+    start = vector.ravel()[motion.free]
+    start = x = start / np.linalg.norm(start)
+    shift = value.real if abs(value.imag) <= 1e-9 * abs(value) else value
+    factors = lu_factor(motion.matrix - (shift * (1 + _OFF) + 1e-300) * np.eye(len(x)))
+    for _ in range(_INVERSE):
+        x = lu_solve(factors, x)
+        x = x / np.linalg.norm(x)
+    found = complex(np.vdot(x, motion.matrix @ x))
+    whole = motion.whole(x)
+    return found, whole / whole.ravel()[np.argmax(np.abs(whole))], float(abs(np.vdot(x, start)))
 
 
 class _Found(NamedTuple):

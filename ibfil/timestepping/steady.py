@@ -43,6 +43,11 @@ class Frame(NamedTuple):
     centre: np.ndarray
 
     @property
+    def still(self) -> bool:
+        """Whether it is the lab."""
+        return not (self.spin.any() or self.rate.any())
+
+    @property
     def turns(self) -> bool:
         """Whether places turn, not e1 alone."""
         return bool(self.rate.any())
@@ -77,9 +82,10 @@ class SteadyFluid(Memoryless):
     def __init__(self, fluid: Fluid, frame: Frame, unknowns: int, time: float) -> None:
         self.fluid, self.frame, self.time, self._m = fluid, frame, time, unknowns
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> _SteadyResponse:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> Response:
         """The fluid's own response less the motion of the frame; ``time`` does not count."""
-        return _SteadyResponse(self.fluid.response(r, e3, self.time, tau), tau * self.frame.motion(r, e3, self._m))
+        inner = self.fluid.response(r, e3, self.time, tau)
+        return inner if self.frame.still else _SteadyResponse(inner, tau * self.frame.motion(r, e3, self._m))
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float

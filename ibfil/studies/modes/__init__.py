@@ -1,0 +1,1 @@
+"""`ibfil rest` and `ibfil modes`: equilibria, growth rates, mode shapes, thresholds."""
