@@ -72,6 +72,7 @@ class _Reduction(NamedTuple):
 
     words: str
     of: Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]
+    average: bool = False  # over half a window it tends to what it is over the whole
 
 
 def _over(reduce: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]:
@@ -86,8 +87,8 @@ def _over(reduce: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, n
 
 _SUMMARIES = {
     "last": _Reduction("", _over(lambda values: values[-1])),
-    "mean": _Reduction("mean over time of ", time_series.mean),
-    "median": _Reduction("median over time of ", _over(lambda values: np.median(values, axis=0))),
+    "mean": _Reduction("mean over time of ", time_series.mean, average=True),
+    "median": _Reduction("median over time of ", _over(lambda values: np.median(values, axis=0)), average=True),
     "max": _Reduction("max over time of ", _over(lambda values: values.max(axis=0))),
     "min": _Reduction("min over time of ", _over(lambda values: values.min(axis=0))),
 }
@@ -136,6 +137,11 @@ class ObservableBase:
     def sample(self, snapshot: Snapshot) -> Value:
         """Value at one output."""
         raise NotImplementedError
+
+    @property
+    def average(self) -> bool:
+        """Whether the summary is a mean or a fit over a window, and not the value of one output."""
+        return self.fitted or _SUMMARIES[self._how].average
 
     @property
     def vector(self) -> bool:

@@ -84,15 +84,14 @@ def shown(value: Any, digits: int = 4) -> str:
 
 
 def with_bar(value: float, bar: float | None, sign: str = "") -> str:
-    """A number with as many digits as its bar leaves known, and the bar with one or two; ``sign`` "+" writes both."""
+    """A number with as many digits as its bar leaves known, and the bar with two; ``sign`` "+" writes both."""
     if bar is None or not 0 < bar < float("inf"):
         return f"{value:{sign}.5g}" + ("" if not bar else " +- not known")
-    digits = 1 if bar >= 3 * 10 ** math.floor(math.log10(bar)) else 2
-    decimals = digits - 1 - math.floor(math.log10(bar))
+    decimals = 1 - math.floor(math.log10(bar))
     if -3 <= decimals <= 8:
         return f"{value:{sign}.{max(decimals, 0)}f} +- {bar:.{max(decimals, 0)}f}"
     size = max(abs(value), bar)
-    return f"{value:{sign}.{max(decimals + math.floor(math.log10(size)), 0)}e} +- {bar:.{digits - 1}e}"
+    return f"{value:{sign}.{max(decimals + math.floor(math.log10(size)), 0)}e} +- {bar:.1e}"
 
 
 def write_json(path: Path, message: Mapping[str, Any]) -> None:

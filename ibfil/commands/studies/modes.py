@@ -7,7 +7,8 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..arguments import CHANGES, DONE, count, log, positive
+from ...screen import tell
+from ..arguments import CHANGES, DONE, count, positive
 from .arguments import begin
 
 if TYPE_CHECKING:
@@ -54,10 +55,10 @@ def do(arguments: argparse.Namespace) -> int:
         count=arguments.count,
         step=arguments.step,
         critical=arguments.critical,
-        log=log,
+        log=tell,
     )
-    print("\n".join(lines(found)))
-    print(f"{folder / files.TABLE}, {files.DETAILS}, {files.RUN} (for vtk and render), {files.FIGURE}")
+    tell("\n".join(lines(found)))
+    tell(f"{folder / files.TABLE}, {files.DETAILS}, {files.RUN} (for vtk and render), {files.FIGURE}")
     return DONE
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ...screen import tell
 from ..arguments import CHANGES, DONE
 from .arguments import begin
 
@@ -23,19 +24,19 @@ def do(arguments: argparse.Namespace) -> int:
     from ...studies.modes import rest
 
     found = rest.rest(case, folder, changes)
-    print(found.title)
+    tell(found.title)
     rows = zip(found.settled.rests, found.settled.leading, found.observables, strict=True)
     for number, (one, leading, seen) in enumerate(rows):
         grows = leading.real > 0 and number < len(found.settled.rests) - 1
         word = f"UNSTABLE: grows at {leading.real:.4g}; pushed off it" if grows else "stable: nothing grows"
         if leading.real < 0:
             word += f"; the slowest to decay goes at {leading.real:.4g}"
-        print(
+        tell(
             f"rest {number + 1}: |v| T/L = {one.residual:.1e} (round-off {found.round_off:.0e}), {one.steps} steps, "
             f"{one.solves} linear solves; {word}"
         )
         for name, value in seen.items():
             parts = value if isinstance(value, list) else [value]
-            print(f"  {name} = {', '.join(f'{part:.6g}' for part in parts)}")
-    print(f'{folder / rest.RUN}, {rest.DETAILS}; shape = {{ kind = "run", path = "{folder / rest.RUN}" }} starts there')
+            tell(f"  {name} = {', '.join(f'{part:.6g}' for part in parts)}")
+    tell(f'{folder / rest.RUN}, {rest.DETAILS}; shape = {{ kind = "run", path = "{folder / rest.RUN}" }} starts there')
     return DONE

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...io.writer import Meaning, Recorder
+from ...io.datasets import Meaning
+from ...io.writer import Recorder
 from ...observables.factory import observers
 from ...simulation.diagnostics import Diagnostics, SolvedState
 from ...timestepping.base import State

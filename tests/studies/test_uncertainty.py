@@ -1,0 +1,149 @@
+"""`ibfil uncertainty`: sources of error, sums, what is no number, refusals, files."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from helpers.calibration import CLAMPED, RFT, TIP, Z, cube, rod, seen, until
+
+from ibfil.commands.main import main
+from ibfil.errors import CaseError, RunFailed
+from ibfil.studies.estimates import estimate
+from ibfil.studies.uncertainty import levels, study
+from ibfil.studies.uncertainty.results import Source
+from ibfil.studies.uncertainty.study import uncertainty
+
+SWAY = (
+    rod(17, 2e3, ends=CLAMPED + '[filament.rod.loads]\nforce = [0, 0, "4*cos(6*t)"]\n')
+    + RFT
+    + until(0.5, 0.02, 0.05)
+    + seen("tip", "position", at=TIP, along=Z)
+    + seen("aside", "position", at=TIP, along="[0, 1, 0]")
+)
+SINKING = (
+    rod(17, 1e3, 'anchor = "middle"\nloads = { weight = [0, 0, -5.0] }')
+    + cube(24)
+    + until(0.1, 0.01, 0.02)
+    + seen("fall", "drift", at='"middle"', along=Z, over="[0.02, 0.1]")
+)
+
+
+def bars(case, folder, *overrides, **options):
+    found = uncertainty(case, folder, overrides, log=lambda line: None, **options)
+    return {bar.name: bar for bar in found.bars}, found
+
+
+def source(bar, name):
+    return next(one for one in bar.sources if one.name == name)
+
+
+def test_the_error_of_a_coarse_run_is_told_with_its_sign(tmp_path):
+    """Against a run 8 times finer in both directions."""
+    found, whole = bars(SWAY, tmp_path / "a")
+    fine, _ = bars(SWAY, tmp_path / "b", "time.step=0.0025", "filament.rod.nodes=129")
+    bar, true = found["tip"], fine["tip"].corrected[0]
+    assert abs(bar.value - true) < bar.bar < 1.5 * abs(bar.value - true)
+    assert abs(bar.corrected[0] - true) < 0.05 * abs(bar.value - true)
+    assert source(bar, "nodes").estimate.word == "seen"
+    assert whole.runs <= 7
+
+
+def test_a_number_that_vanishes_has_a_bar_of_round_off(tmp_path):
+    found, _ = bars(SWAY, tmp_path, observe=["aside"])
+    assert set(found) == {"aside"}
+    assert abs(found["aside"].value) <= found["aside"].bar < 1e-8
+
+
+def test_a_grid_adds_the_place_in_a_cell_and_the_images_of_a_net_force(tmp_path):
+    """A box half as wide again falls short of an open fluid by what L^-1 says."""
+    found, _ = bars(SINKING, tmp_path, meant=True)
+    bar = found["fall"]
+    assert source(bar, "place in a cell").estimate is not None
+    images = source(bar, "images")
+    assert images.words.startswith("L^-1")
+    assert not images.numerical
+    here, wider = images.estimate.values
+    assert images.estimate.error == pytest.approx((here - wider) * 3.0, rel=1e-9)
+    assert abs(bar.meant[0]) > abs(bar.corrected[0])  # an open fluid lets it sink faster
+
+
+def test_a_number_that_the_levels_do_not_agree_on_is_none():
+    three = Source("step", True, estimate([1.0, -0.5, 0.75], [4.0, 2.0, 1.0], 2.0, 1), "")
+    assert study.nothing(-0.5, [three], 1.0).startswith("no number: its levels (step) are 1, -0.5, 0.75")
+    assert study.nothing(-0.5, [three], 100.0) == ""  # next to what its series does, it is near zero and fine
+    assert study.nothing(float("nan"), [], 1.0) == "no number: the run gives none"
+
+
+def test_a_window_that_is_not_settled_is_told(tmp_path, capsys):
+    case = tmp_path / "falls.toml"
+    fit = seen("fall", "drift", at=TIP, along=Z, over="[0, 0.5]")
+    case.write_text(SWAY.replace('"4*cos(6*t)"', "-4") + fit)
+    assert main(["uncertainty", str(case), "--observe", "fall", "-o", str(tmp_path / "out")]) == 0
+    out = capsys.readouterr().out
+    assert "not settled: over the two halves of its window" in out
+    assert "fall = -" in out
+    rows = list(csv.DictReader((tmp_path / "out" / "uncertainty.csv").open()))
+    assert {row["source"] for row in rows} == {"step", "nodes", "outputs"}
+    told = json.loads((tmp_path / "out" / "uncertainty.json").read_text())["numbers"][0]
+    assert told["bar_is_whole"] is True
+    assert (tmp_path / "out" / "uncertainty.png").stat().st_size > 10_000
+
+
+def test_levels_that_fail_leave_at_least_the_others(tmp_path, monkeypatch, capsys):
+    """A finer level without its result: the source tells why, and the bar is a lower bound."""
+    case = tmp_path / "sway.toml"
+    case.write_text(SWAY)
+    with pytest.raises(RunFailed):
+        uncertainty(SWAY, tmp_path / "none", ["filament.rod.loads.force=[0,0,'1/(0.3 - t)']"], log=lambda line: None)
+    monkeypatch.setattr(levels, "nodes", _too_many)
+    assert main(["uncertainty", str(case), "--observe", "tip", "-o", str(tmp_path / "out")]) == 0
+    out = capsys.readouterr().out
+    assert "+- at least" in out
+    assert "not known" in out
+    assert "nodes" in out[out.index("not known") - 40 :]
+
+
+def _too_many(base, under):
+    """A direction none of whose levels can be read."""
+    there = NODES(base, under)
+    return there._replace(overrides=lambda level: ("filament.rod.nodes=1",))
+
+
+NODES = levels.nodes
+
+
+def test_thermal_numbers_scatter_between_blocks_and_hide_the_rest(tmp_path):
+    chance = SWAY + "[thermal]\nenergy = 1e-7\nseed = 1\n" + seen("reach", "end_to_end", summary='"mean"')
+    found, whole = bars(chance, tmp_path, observe=["reach", "tip"])
+    assert whole.runs == 1
+    assert source(found["reach"], "seeds").estimate.doubt > 0
+    assert source(found["tip"], "seeds").estimate is None
+    assert not found["reach"].whole
+    again, whole = bars(chance, tmp_path, observe=["tip"], fine=True)
+    assert whole.runs == 8
+    values = source(again["tip"], "seeds").estimate.values
+    assert source(again["tip"], "seeds").estimate.doubt == pytest.approx(2.3646 * np.std(values, ddof=1) / np.sqrt(8))
+
+
+def test_rods_together_are_refined_together(tmp_path):
+    """All filaments take the same level at once, those of other lengths too."""
+    second = "[filament.two]\nlength = 0.5\nnodes = 9\nbending = 0.2\nstretching = 1e3\nposition = [0, 1, 0]\n"
+    both = second + SWAY.replace('kind = "position"', 'kind = "position"\nfilament = "rod"')
+    found, _ = bars(both + "", tmp_path, "filament.two.loads={weight=[0,0,-1]}", observe=["tip"])
+    assert found["tip"].whole
+    fine = tmp_path / "runs" / "nodes_fine.h5"
+    from ibfil.io.reader import RunFile
+
+    with RunFile(fine) as run:
+        assert {name: f.nodes for name, f in run.case.filaments.items()} == {"two": 17, "rod": 33}
+
+
+def test_refusals(tmp_path):
+    bare = SWAY[: SWAY.index("[observe")]
+    with pytest.raises(CaseError, match=r"\[observe\]: found none"):
+        uncertainty(bare, tmp_path)
+    with pytest.raises(CaseError, match="--observe: found top; allowed: tip, aside"):
+        uncertainty(SWAY, tmp_path, observe=["top"])
