@@ -23,7 +23,8 @@ def add(command: argparse.ArgumentParser) -> None:
     add_case(command, "*")
     command.add_argument("-o", dest="output", metavar="RUN.h5", help="the run file (default: the case's name, here)")
     command.add_argument("--force", action="store_true", help="replace a run file that is there already")
-    command.add_argument("--resume", metavar="RUN.h5", help="go on from the last checkpoint of this run")
+    longer = "go on with this run where it was cut, or with time.end=... make it longer"
+    command.add_argument("--resume", metavar="RUN.h5", help=longer)
 
 
 def do(arguments: argparse.Namespace) -> int:
@@ -83,6 +84,7 @@ def _end(result: Result, changes: str = "") -> int:
         told = digest(run)
     reason = f" ({told['reason']})" if told["reason"] else ""
     tell(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
-    tell(f"{result.path}: {told['outputs']} outputs")
+    longer = f" (longer: ibfil run --resume {result.path} time.end=...)" if told["status"] == "finished" else ""
+    tell(f"{result.path}: {told['outputs']} outputs{longer}")
     tell(results(told, changes))
     return DONE

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..errors import Interrupted, RunFailed, Stopped
 from ..io import checkpoint
@@ -17,7 +20,7 @@ from ..io.paths import checkpoint_path
 from ..io.writer import GridPlace, Recorder, record_end
 from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
-from ..simulation.schedule import SAME, Due, due_times
+from ..simulation.schedule import SAME, Due, due_times, lasts
 from ..threads import one_thread_of_blas
 from .progress import Progress, Signals
 from .result import Result
@@ -52,6 +55,7 @@ class Loop:
         self._pace = Pace()
         self._next_look = self._next_checkpoint = 0.0
         self._good: float | None = None  # time of the last checkpoint
+        self._longer: checkpoint.Checkpoint | None = None  # what a longer run goes on from, where that is not the end
         self._progress: Progress | None = None
 
     def start(self, path: Path | None, overwrite: bool, groups: Mapping[str, float]) -> Result:
@@ -115,6 +119,8 @@ class Loop:
         simulation, slack = self.simulation, SAME * self.case.time.end
         self._progress = Progress(simulation.time, self.case.time.end, self._log, self._show)
         for due in dues:
+            if due is dues[-1] and self._recorder is not None and not lasts(self.case, simulation.grid is not None):
+                self._longer = _copied(self._present(self._recorder))
             if due.time > simulation.time + slack:
                 try:
                     simulation.advance(due.time, self._after_step)
@@ -176,34 +182,36 @@ class Loop:
         pace = self._pace.attributes(simulation.time)
         return {"steps": simulation.steps, "wall_time": self._wall_time(), "wisdom": simulation.wisdom, **pace}
 
-    def _checkpoint(self) -> None:
-        """Have all outputs so far on the disk, then the state. Raises RunFailed."""
-        recorder, path, simulation = self._recorder, self._path, self.simulation
+    def _present(self, recorder: Recorder) -> checkpoint.Checkpoint:
+        """The checkpoint of the present state, in the memory of the simulation."""
+        simulation = self.simulation
+        return checkpoint.Checkpoint(
+            state=simulation.state(),
+            time=simulation.time,
+            steps=simulation.steps,
+            outputs=recorder.outputs,
+            fields=recorder.fields,
+            wall_time=self._wall_time(),
+            case=self.case.text,
+            file=self.case.file,
+            wisdom=simulation.wisdom,
+            created=recorder.created,
+        )
+
+    def _checkpoint(self, of_end: checkpoint.Checkpoint | None = None) -> None:
+        """Have all outputs so far on the disk, then the present state, or that ``of_end``. Raises RunFailed."""
+        recorder, path = self._recorder, self._path
         assert recorder is not None
         assert path is not None
         recorder.write(**self._attributes())
         place = checkpoint_path(path)
         try:
-            checkpoint.write(
-                place,
-                checkpoint.Checkpoint(
-                    state=simulation.state(),
-                    time=simulation.time,
-                    steps=simulation.steps,
-                    outputs=recorder.outputs,
-                    fields=recorder.fields,
-                    wall_time=self._wall_time(),
-                    case=self.case.text,
-                    file=self.case.file,
-                    wisdom=simulation.wisdom,
-                    created=recorder.created,
-                ),
-            )
+            checkpoint.write(place, of_end or self._present(recorder))
         except OSError as error:
             raise failed_write(place, error) from error
         except Stranger as stranger:
             raise RunFailed(str(stranger), advice="the outputs up to here are in the run file") from None
-        self._good = simulation.time
+        self._good = self.simulation.time
         self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
 
     def _guarded(self, work: Callable[[], tuple[str, str]]) -> Result:
@@ -241,13 +249,23 @@ class Loop:
         return failure
 
     def _finished(self, status: str, reason: str) -> Result:
-        """Close the run file and remove the checkpoint."""
+        """Close the run file. The checkpoint stays, to make it longer, but where a rule has ended it."""
         if self._recorder is not None and self._path is not None:
+            if status == "finished":
+                self._keep()
             self._recorder.finish(status, reason, **self._attributes())
-            checkpoint_path(self._path).unlink(missing_ok=True)
+            if status != "finished":
+                checkpoint_path(self._path).unlink(missing_ok=True)
         assert self._snapshot is not None
         steps, wall_time = self.simulation.steps, self._wall_time()
         return Result(self.case, status, reason, self._path, steps, wall_time, self._snapshot, self._observed)
+
+    def _keep(self) -> None:
+        """Write what a longer run goes on from; where that fails an earlier checkpoint has to do, and it is told."""
+        try:
+            self._checkpoint(self._longer)
+        except RunFailed as failure:
+            self._log(f"warning: {failure.message}; to make the run longer will take more of it again")
 
     def _interrupted(self) -> Interrupted:
         """Write a checkpoint, and say how to go on."""
@@ -267,3 +285,8 @@ class Loop:
         except Exception:  # what went wrong first is what counts
             self._recorder.close()
             record_end(self._path, "failed", reason)
+
+
+def _copied(one: checkpoint.Checkpoint) -> checkpoint.Checkpoint:
+    """The same, in memory of its own: it stays as it is while the simulation goes on."""
+    return replace(one, state={k: np.copy(v) if isinstance(v, np.ndarray) else v for k, v in one.state.items()})

@@ -21,6 +21,7 @@ from ..observables.factory import observers
 from ..observables.observers import ObservableSet
 from ..observables.stop_rules import StopRules
 from ..screen import tell
+from ..simulation.schedule import meets
 from .loop import Loop
 from .result import Result
 
@@ -48,7 +49,8 @@ def run(
 ) -> Result:
     """Run a case (or the case file of that name) and write the run file ``output``; None writes nothing.
 
-    With ``resume`` it goes on from the checkpoint of ``output`` if there is one. ``observables`` are further ones, made
+    With ``resume`` it goes on from the checkpoint of ``output`` if there is one, or makes a finished run longer.
+    ``observables`` are further ones, made
     in Python, and ``laws`` constitutive laws by filament (rods/constitutive.py). ``build`` makes the simulation from
     the case and FFTW wisdom, by default `Simulation` with
     these laws, and ``look`` says what is told of it before it runs.
@@ -64,7 +66,7 @@ def run(
         case = read_case(case)
     build = build or _builder(laws)
     path = None if output is None else Path(output)
-    if path is not None and resume and checkpoint_path(path).exists():
+    if path is not None and resume and checkpoint_path(path).exists() and case.time.end > _end_of(path):
         return resume_run(path, case, progress=progress, log=log, observables=observables, build=build, look=look)
     seen = observers(case, observables)
     if path is not None:
@@ -91,17 +93,17 @@ def resume_run(
 ) -> Result:
     """Go on with the run in ``path`` from its last checkpoint, bit for bit as if it had never been cut.
 
-    The case is the one it began with, or ``case``, or that with ``overrides``: only time.end and output may
-    differ. The run file is cut back to the checkpoint; a torn one is put right, and one damaged beyond that
-    is computed again. ``laws`` made in Python have to be given again. Raises as `run`, and RunFileError (a
-    CaseError) where there is nothing to go on from.
+    One that is finished is made longer, to a later time.end, as if that had been asked for at first. The case is the
+    one it began with, or ``case``, or that with ``overrides``: only time.end and output may differ. The run file is cut
+    back to the checkpoint; a torn one is put right, and one damaged beyond that is computed again. ``laws`` made in
+    Python have to be given again. Raises as `run`, and RunFileError (a CaseError) where there is nothing to go on from.
     """
     path, build = Path(path), build or _builder(laws)
     if is_being_written(journal_path(path)):
         raise RunFileError(f"{path}: is being written by another ibfil that is still running")
     last = _last_checkpoint(path)
     began = parse_case(last.case, last.file)
-    case = _goes_on(began, case or parse_case(last.case, last.file, overrides), last)
+    case = _goes_on(path, began, case or parse_case(last.case, last.file, overrides), last)
     seen = observers(case, observables)
     rules = StopRules(case, seen)
     try:
@@ -121,6 +123,8 @@ def resume_run(
         raise RunFileError(f"{place}: has no {missing} in its state; {wrote}") from None
     if other:
         log(f"warning: {other}; the rest may differ in the last digits from a run that was not cut")
+    if case.time.end != began.time.end and not meets(began, case, last.time, simulation.grid is not None):
+        log(f"warning: {path} was cut on its way to its end, which is no output now: steps from here are other ones")
     log(f"going on with {path} from t = {last.time:.6g}, after {last.outputs} outputs and {last.steps} steps")
     return Loop(simulation, seen, log, progress, rules).go_on(path, last, fields_at)
 
@@ -132,6 +136,14 @@ def _holds_no_more_than_its_start(path: Path) -> bool:
         if found.status in ("failed", "cut") and len(found) <= 1:
             return not beside.exists() or checkpoint.read(beside).time == 0.0
     return False
+
+
+def _end_of(path: Path, created: str = "") -> float:
+    """When a finished run, ``created`` then, ended; -1 where it is another, has not finished or cannot be read."""
+    with suppress(CaseError, OSError, KeyError, ValueError, RuntimeError), RunFile(path) as found:
+        if found.status == "finished" and created in ("", found.created):
+            return float(found.time[-1])
+    return -1.0
 
 
 def _builder(laws: Mapping[str, MomentLaw] | None) -> Build:
@@ -164,13 +176,13 @@ def _last_checkpoint(path: Path) -> checkpoint.Checkpoint:
             with RunFile(path) as run_file:
                 status = f"; its run is {run_file.status}"
                 if run_file.status in ("finished", "stopped"):
-                    status += ', and a new one may start from its last frame: shape = { kind = "run", path = ... }'
+                    status += ', and a new one may start from its last output: shape = { kind = "run", path = ... }'
         raise RunFileError(f"{path}: no checkpoint {beside.name} to go on from{status}")
     return checkpoint.read(beside)
 
 
-def _goes_on(began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
-    """Return the case to go on with. Raises CaseError where more than time.end and output differs."""
+def _goes_on(path: Path, began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
+    """The case to go on with. Raises CaseError where more than time.end and output differs, or nothing is to do."""
     faults = [
         f"{case.file}: {key}: found {written(now)}; the run began with {written(then)}, and only time.end and output "
         'may change: go on without that, or begin a new run (shape.kind = "run" starts from a frame of this one)'
@@ -182,6 +194,10 @@ def _goes_on(began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
         faults.append(f"{case.file}: time.end: found {case.time.end:g}; allowed: {allowed}")
     if faults:
         raise CaseError(faults)
+    ended = _end_of(path, last.created)
+    if case.time.end <= ended:
+        allowed = f"above {ended:g}, to make it longer: time.end=..."
+        raise RunFileError(f"{path}: is finished; time.end: found {case.time.end:g}; allowed: {allowed}")
     return case
 
 

@@ -22,19 +22,32 @@ class Due(NamedTuple):
     fields: bool
 
 
-def due_times(case: Case, grid: bool) -> list[Due]:
-    """All times of outputs and fields; the start and the end are always outputs.
+def due_times(case: Case, grid: bool, end: float | None = None) -> list[Due]:
+    """All times of outputs and fields up to ``end``, by default that of the case; start and end are always outputs.
 
     Where ``grid`` is False (a fluid without one) there are no fields. Times that are equal but for rounding
     are one.
     """
-    output, end = case.output, case.time.end
+    output, end = case.output, case.time.end if end is None else end
     times = output.times or () if output.every is None else _multiples(output.every, end)
     outputs = _distinct([0.0, *times, end], end)
     fields = np.array(_multiples(output.grid_every, end) if grid and output.grid_every else [])
     every = _distinct([*outputs, *fields], end)
     columns = zip(every, _among(every, outputs, end), _among(every, fields, end), strict=True)
     return [Due(float(time), bool(first), bool(second)) for time, first, second in columns]
+
+
+def lasts(case: Case, grid: bool) -> bool:
+    """Whether a longer run has, to the bit, the same outputs and fields at the time at which this one ends."""
+    last = due_times(case, grid)[-1]
+    return last in due_times(case, grid, 2 * case.time.end)
+
+
+def meets(began: Case, case: Case, time: float, grid: bool) -> bool:
+    """Whether steps from ``time`` on lead to the same next output in a case that goes on with another one."""
+    a, b = ([due.time for due in due_times(one, grid)] for one in (began, case))
+    both = set(a) & set(b)
+    return time in both or min((t for t in (*a, *b) if t > time), default=time) in both
 
 
 def _multiples(every: float, end: float) -> list[float]:

@@ -366,7 +366,7 @@ class Simulation:
         self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
         known: dict[str, np.ndarray | float] = {**array, **number}
         control = {k.removeprefix("control_"): v for k, v in known.items() if k.startswith("control_")}
-        self._control.restore(control)
+        self.notices += [] if self._control.restore(control) else [steps.OTHER_STEPS]
         self.limits.restore({k.removeprefix("limits_"): v for k, v in number.items() if k.startswith("limits_")})
         if memory := {k.removeprefix("fluid_"): v for k, v in known.items() if k.startswith("fluid_")}:
             self.fluid.recall(memory)

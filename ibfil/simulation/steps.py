@@ -31,6 +31,10 @@ LONG_PHASE = 2 * np.pi / POINTS_GIVEN  # omega dt above which it is
 AUTOMATIC_ERROR = 1e-3  # of the length, over a run: of a step that grows as rods go to rest
 STRETCH = 1e-3  # what thermal kicks may leave of it with the automatic step
 _HALVINGS = 40
+OTHER_STEPS = (
+    "time.step is auto, which looks at the whole run: with this time.end other steps would have been taken from the "
+    "start, so the numbers differ from those of one run by as much as steps err; a given time.step goes on bit for bit"
+)
 OWN = "the rods' own growth or swing under what acts on them"
 
 
@@ -50,9 +54,7 @@ def choose(model: Model, drivers: Drivers) -> Choice:
     if time.tolerance is not None:
         first, reason = (float(time.step), "given") if not time.automatic else _shortest(model, drivers)
         rate = 2 * np.pi / (POINTS_A_PERIOD * first)
-        return Choice(
-            AdaptiveStep(time.tolerance, rate, time.end, time.order, system.length), reason, time.end, "error"
-        )
+        return Choice(AdaptiveStep(time.tolerance, rate, np.inf, time.order, system.length), reason, time.end, "error")
     if not time.automatic:
         return Choice(FixedStep(float(time.step), growth), "given", float(time.step), "")
     if time.explicit:

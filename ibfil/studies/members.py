@@ -119,6 +119,7 @@ def _run(case: Case, path: Path) -> tuple[str, str]:
         last = read(checkpoint_path(path))
         begun = path.exists() and not _differing(parse_case(last.case, last.file), case)
     result = run(case, path, overwrite=True, resume=begun, progress=False, log=stop_if_cut)
+    checkpoint_path(path).unlink(missing_ok=True)  # many small files, for runs that are of one length
     return result.status, result.reason
 
 

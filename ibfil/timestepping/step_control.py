@@ -35,9 +35,13 @@ class Verdict(Enum):
 
 
 class StepControl(Protocol):
-    """One way to choose steps. ``shortened`` counts those that had to be tried again."""
+    """One way to choose steps. ``shortened`` counts those that had to be tried again.
+
+    ``chosen``: the lengths, rates and tolerances that it was made with.
+    """
 
     shortened: int
+    chosen: tuple[float, ...]
 
     @property
     def length(self) -> float:
@@ -62,8 +66,8 @@ class StepControl(Protocol):
     def state(self) -> dict[str, Any]:
         """The state of the control, by name: part of a run's state."""
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Goes on from what ``state`` gave."""
+    def restore(self, state: dict[str, Any]) -> bool:
+        """Goes on from what ``state`` gave; whether that had been ``chosen`` as this one was."""
 
 
 def equal_parts(time: float, length: float) -> int:
@@ -80,6 +84,7 @@ class FixedStep:
 
     def __init__(self, length: float, growth: float = np.inf) -> None:
         self.length, self._growth = length, growth
+        self.chosen: tuple[float, ...] = (length,)
         self.shortened = 0
         self._plan = (0.0, 0.0, 1, 1)  # interval start and end, its number of steps, those taken
         self._trial = 0.0  # length to try for the step of the plan that is under way; 0 where none is
@@ -146,9 +151,10 @@ class FixedStep:
             "plan_count": count,
             "plan_done": done,
             "trial": self._trial,
+            "chosen": np.array(self.chosen),
         }
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any]) -> bool:
         """Goes on from what ``state`` gave."""
         self.length, self.shortened = float(state["length"]), int(state["shortened"])
         self._plan = (
@@ -158,6 +164,7 @@ class FixedStep:
             int(state["plan_done"]),
         )
         self._trial = float(state["trial"])
+        return np.array_equal(state["chosen"], self.chosen)
 
 
 class AdaptiveStep:
@@ -190,6 +197,7 @@ class AdaptiveStep:
         self.tolerance, self._longest, self._shortest = tolerance, longest, shortest
         self.length = shortest or min(tolerance, 1.0) / rate
         self._rate, self._order, self._size = rate, order, size
+        self.chosen: tuple[float, ...] = (tolerance, rate, longest, shortest)
         self.shortened = 0
         self._rejected = 0  # times in a row
         self._wanted = 0.0  # what the error of the last step would allow the next; 0 where that has been seen to
@@ -264,18 +272,19 @@ class AdaptiveStep:
     def state(self) -> dict[str, Any]:
         """The step's length and the displacements the error is estimated from, by name."""
         out: dict[str, Any] = {"length": self.length, "wanted": self._wanted, "shortened": self.shortened}
-        out["past"] = len(self._before)
+        out["past"], out["chosen"] = len(self._before), np.array(self.chosen)
         for k, (dt, y) in enumerate(self._before):
             out |= {f"dt_{k}": dt, f"y_{k}": y}
         return out
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any]) -> bool:
         """Takes up what ``state`` gave."""
         self.length, self.shortened = float(state["length"]), int(state["shortened"])
         self._wanted = float(state["wanted"])
         self._before = [
             (float(state[f"dt_{k}"]), np.ascontiguousarray(state[f"y_{k}"])) for k in range(int(state["past"]))
         ]
+        return np.array_equal(state["chosen"], self.chosen)
 
 
 def _rms(y: np.ndarray) -> float:

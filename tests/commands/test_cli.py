@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.made_run import BENT, make_run
 from helpers.runs import wait_for
@@ -75,7 +76,7 @@ sys.exit(main(sys.argv[1:]))
         if words is run:
             assert done.returncode == 0, done.stderr
             assert "seen: 2 2 passive" in done.stdout
-    # The finished run has no checkpoint: there is nothing to go on from, which is one line and no traceback.
+    # The finished run is to be no longer than it is: there is nothing to do, which is one line and no traceback.
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
 
@@ -97,7 +98,7 @@ def test_run_writes_the_run_file_and_tells_the_result(here, capsys):
     with RunFile("bent.h5") as run:
         assert run.status == "finished"
         assert len(run) == 5
-    assert {path.name for path in here.iterdir()} == {"bent.toml", "bent.h5"}
+    assert {path.name for path in here.iterdir()} == {"bent.toml", "bent.h5", "bent.ckpt.h5"}
 
 
 def test_what_was_expected_of_the_case_before_it_was_changed(here, capsys):
@@ -107,10 +108,20 @@ def test_what_was_expected_of_the_case_before_it_was_changed(here, capsys):
     assert [line.split()[:2] for line in out.splitlines() if " span " in line][-1] == ["differs", "span"]
 
 
-def test_a_finished_run_says_how_to_begin_where_it_ended(here, capsys):
+def test_a_finished_run_is_made_longer_or_says_how_to_begin_where_it_ended(here, capsys):
     assert main.main(["run", "bent.toml"]) == 0
+    assert "(longer: ibfil run --resume bent.h5 time.end=...)" in capsys.readouterr().out
+    with RunFile("bent.h5") as run:
+        longer = f"time.end={2 * run.time[-1]}"
+    assert main.main(["run", "--resume", "bent.h5", longer]) == 0
+    assert main.main(["run", "bent.toml", longer, "-o", "whole.h5"]) == 0
+    with RunFile("bent.h5") as run, RunFile("whole.h5") as whole:
+        assert len(run) == len(whole) == 9
+        for name, columns in whole.filaments.items():
+            assert all(np.array_equal(columns[key], run.filaments[name][key]) for key in columns)
+    (here / "bent.ckpt.h5").unlink()
     assert main.main(["run", "--resume", "bent.h5", "time.end=9"]) == 2
-    assert 'a new one may start from its last frame: shape = { kind = "run"' in capsys.readouterr().err
+    assert 'a new one may start from its last output: shape = { kind = "run"' in capsys.readouterr().err
 
 
 def test_words_may_stand_before_and_after_options(here, capsys):
@@ -291,7 +302,7 @@ def test_ctrl_c_says_how_to_go_on_and_that_works(here, cut_here):
     with RunFile("bent.h5") as run:
         assert run.status == "finished"
         assert run.time[-1] > reached
-    assert not (here / "bent.ckpt.h5").exists()
+    assert (here / "bent.ckpt.h5").exists()  # to make it longer
 
 
 def test_a_change_that_may_not_be_made_on_the_way(cut_here, capsys):

@@ -13,10 +13,25 @@ import pytest
 from helpers.fake_simulation import FakeSimulation, case
 from helpers.runs import HERE, SCENES, content, go_on, interrupted, run, signalling
 
+from ibfil.case.reading import parse_case
 from ibfil.errors import CaseError, Interrupted, RunFileError
 from ibfil.io import checkpoint
 from ibfil.io.paths import checkpoint_path
 from ibfil.io.reader import RunFile
+
+LONGER = {
+    name: SCENES[name]
+    for name in (
+        "fake",
+        "rft",
+        "table",
+        "navier-stokes",
+        "tolerance, rft",
+        "tolerance, navier-stokes",
+        "thermal",
+        "contact",
+    )
+}
 
 # --- Ctrl-C, and going on --------------------------------------------------------------------------------------------
 
@@ -37,7 +52,7 @@ def test_cut_and_gone_on_with_is_as_never_cut(tmp_path, scene):
     assert (result.status, result.steps) == ("finished", expected.steps)
     for name, summary in expected.summaries.items():
         assert np.array_equal(result.summaries[name].value, summary.value, equal_nan=True)
-    assert not checkpoint_path(path).exists()
+    assert checkpoint.read(checkpoint_path(path)).time <= result.case.time.end
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -148,6 +163,9 @@ def test_nothing_to_go_on_from_is_one_line(path, tmp_path):
     with pytest.raises(RunFileError, match=r"no checkpoint run\.ckpt\.h5"):
         go_on(path)
     run(case(), path)
+    with pytest.raises(RunFileError, match=r"is finished; time\.end: found 1; allowed: above 1, to make it longer"):
+        go_on(path)
+    checkpoint_path(path).unlink()
     with pytest.raises(RunFileError, match="its run is finished"):
         go_on(path)
     other = tmp_path / "other.h5"
@@ -172,3 +190,76 @@ def test_a_run_that_is_running_is_not_gone_on_with(path):
 
     run(case(), path, build=Asking)
     assert shared
+
+
+# --- a finished run made longer --------------------------------------------------------------------------------------
+
+
+def half(given):
+    """The case, and the same with half of its outputs: two times the second make the first."""
+    whole = given()
+    return whole, parse_case(whole.text, whole.file, [f"time.end={whole.time.end / 2!r}"])
+
+
+@pytest.mark.parametrize("scene", LONGER)
+def test_a_finished_run_is_made_longer_bit_for_bit(tmp_path, scene):
+    given, build, _ = LONGER[scene]
+    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
+    long, short = half(given)
+    expected = run(long, whole, build=build)
+    told = []
+    run(short, path, build=build)
+    assert checkpoint.read(checkpoint_path(path)).time <= short.time.end
+    result = go_on(path, None, [f"time.end={long.time.end!r}"], build=build, log=told.append)
+    assert content(path) == content(whole)
+    assert result.steps == expected.steps
+    assert not any("warning" in line for line in told)
+    for name, summary in expected.summaries.items():
+        assert np.array_equal(result.summaries[name].value, summary.value, equal_nan=True)
+
+
+@pytest.mark.parametrize("end", ["0.15", "0.2", "0.52", "0.01"])  # 3*0.05 is not 0.15, 0.52 no output of longer ones
+def test_an_end_that_is_no_output_of_the_longer_run_leaves_no_trace(path, uncut, end):
+    run(case("", f"time.end={end}"), path)
+    go_on(path, None, ["time.end=0.7"])
+    go_on(path, None, ["time.end=1.0"])
+    assert content(path) == content(uncut)
+
+
+def test_outputs_of_the_longer_part_may_be_at_other_times(path):
+    run(case("", "time.end=0.5"), path)
+    go_on(path, None, ["time.end=1.0", "output.every=0.25"])
+    with RunFile(path) as file:
+        assert np.allclose(file.time, [*np.arange(0, 0.51, 0.05), 0.75, 1.0])
+        assert file.case.output.every == 0.25
+
+
+def test_a_finished_run_is_not_made_shorter_or_run_again(path):
+    run(case("", "time.end=0.52"), path)
+    before = path.read_bytes()
+    for end in ("0.51", "0.52"):
+        with pytest.raises(RunFileError, match=r"is finished; time\.end: found 0\.5\d*; allowed: above 0\.52"):
+            go_on(path, None, [f"time.end={end}"])
+    with pytest.raises(CaseError, match="exists"):
+        run(case("", "time.end=0.52"), path, resume=True)
+    assert path.read_bytes() == before
+    assert run(case(), path, resume=True).steps == 340
+
+
+def test_a_run_cut_on_its_way_to_an_end_that_moves_is_told_of(path):
+    with pytest.raises(Interrupted):
+        run(case("", "time.end=0.52"), path, build=signalling(FakeSimulation, 174))
+    told = []
+    go_on(path, None, ["time.end=1.0"], log=told.append)
+    assert any("was cut on its way to its end" in line for line in told)
+
+
+def test_steps_chosen_for_the_shorter_run_are_told_of(tmp_path):
+    given, build, _ = SCENES["rft"]
+    told, path = [], tmp_path / "run.h5"
+    still = ["curvature=[0,0]", "start={end='clamped'}"]
+    keys = [f"filament.rod.{key}" for key in still] + ["time.step=auto"]
+    short = parse_case(given().text, "rod.toml", [*keys, "time.end=0.004"])
+    run(short, path, build=build)
+    go_on(path, None, ["time.end=0.008"], build=build, log=told.append)
+    assert any("time.step is auto" in line for line in told)
