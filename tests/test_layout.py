@@ -132,9 +132,8 @@ def test_no_files_import_each_other_in_a_round():
 
 LONG_FILES = {  # lines today; the list only shrinks
     "case/expressions.py": 345,
-    "observables/local.py": 387,
     "rods/torque_free.py": 358,
-    "simulation/simulation.py": 385,
+    "simulation/simulation.py": 383,
 }
 LONG_FUNCTIONS: set[str] = set()
 

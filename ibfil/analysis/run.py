@@ -38,7 +38,10 @@ class Run(RunFile):
     """A run file, open for reading: lazy arrays, the flow at any point, meshes. Made by `ibfil.open`.
 
     ``time`` (T,), ``filaments[NAME][KEY]`` (T, N, 3) or (T, N-1), ``observables[NAME]``, ``diagnostics[NAME]`` (T,) or
-    (T, 3) are read where they are indexed. ``case`` is the case it ran; ``status``, ``reason``, ``steps``, ``versions``
+    (T, 3) are read where they are indexed; ``numbers[NAME]`` are what `ibfil show` prints of the observables. One that
+    is fitted to a series, as a drift U, has that as ``observables["U.position"]``.
+
+    ``case`` is the case it ran; ``status``, ``reason``, ``steps``, ``versions``
     ... tell of the run. Units are the case's: ``run.units("filaments/NAME/force")`` has their label.
     """
 
@@ -55,6 +58,18 @@ class Run(RunFile):
         )
         span = f"t = {self.time[0]:g} to {self.time[-1]:g}"
         return f"<Run {self.path}: {self.status}, {len(self)} outputs, {span}; {filaments}>"
+
+    @property
+    def numbers(self) -> dict[str, float | np.ndarray]:
+        """The number, or vector (3,), of each observable of the case: of a drift the speed, of a growth the rate.
+
+        >>> with ibfil.open("run.h5") as run:
+        ...     print(run.numbers)
+        {}
+        """
+        from ..observables.factory import numbers_of
+
+        return {name: one.value for name, one in numbers_of(self.case, self.time, self.observables).items()}
 
     def output_at(self, time: float | None = None) -> int:
         """The number of the output nearest to ``time``; the last by default. Raises CaseError outside of the run."""

@@ -15,15 +15,15 @@ from ..io.reader import RunFile
 from ..io.units import label
 from ..observables.base import Observable
 from ..observables.expectations import check
-from ..observables.factory import observers
-from ..observables.observers import Summary, summaries
+from ..observables.factory import numbers_of, observers
+from ..observables.observers import Summary
 
 
 def digest(run: RunFile) -> dict[str, Any]:
     """All that is told of a run, ready for JSON: a number that is not finite is None, a vector a list."""
     case = run.case
-    observables = observers(case).observables
-    found = summaries(observables, run.time, {name: np.asarray(run.observables[name]) for name in observables})
+    observables, found = observers(case).observables, numbers_of(case, run.time, run.observables)
+    extra = set(run.observables) - {case.observe[name].recorded(name) for name in observables}  # made in Python
     return {
         "file": str(run.path),
         "title": case.title,
@@ -42,7 +42,8 @@ def digest(run: RunFile) -> dict[str, Any]:
         "groups": run.groups,
         "filaments": {name: columns["position"].shape[1] for name, columns in run.filaments.items()},
         "fields": {} if run.grid is None else {name: len(column) for name, column in run.grid.fields.items()},
-        "observables": {name: _observed(run, name, observables.get(name), found.get(name)) for name in run.observables},
+        "observables": {name: _observed(run, name, observables[name], found[name]) for name in observables}
+        | {name: _last(run, name) for name in run.observables if name in extra},
         "diagnostics": {name: _extent(run, name) for name in run.diagnostics},
         "expected": [
             {
@@ -62,19 +63,23 @@ def digest(run: RunFile) -> dict[str, Any]:
     }
 
 
-def _observed(run: RunFile, name: str, observable: Observable | None, found: Summary | None) -> dict[str, Any]:
-    """The number of one observable; the last value of one that was added from Python."""
-    path = f"observables/{name}"
-    if observable is None or found is None:
-        last = _plain(run.observables[name][-1])
-        return {"value": last, "units": run.units(path), "description": run.description(path), "note": ""}
+def _observed(run: RunFile, name: str, observable: Observable, found: Summary) -> dict[str, Any]:
+    """The number of one observable of the case."""
     units = label(run.case.units, observable.summary_dimension)
+    words = getattr(observable, "words", observable.description)
     return {
         "value": _plain(found.value),
         "units": units,
-        "description": getattr(observable, "words", run.description(path)),
+        "description": words,
         "note": found.note,
+        "quality": found.quality,
     }
+
+
+def _last(run: RunFile, name: str) -> dict[str, Any]:
+    """The last value of an observable that was added from Python."""
+    path, last = f"observables/{name}", _plain(run.observables[name][-1])
+    return {"value": last, "units": run.units(path), "description": run.description(path), "note": "", "quality": ""}
 
 
 def _plain(value: float | np.ndarray) -> float | list[float | None] | None:
@@ -128,7 +133,7 @@ def as_text(told: Mapping[str, Any]) -> str:
 def results(told: Mapping[str, Any], changes: str = "") -> str:
     """The observables and what was expected of them, of the case without ``changes``, as `ibfil run` ends with."""
     rows = [
-        (name, "=", _number(found["value"]), found["units"], found["note"] or found["description"])
+        (name, "=", _number(found["value"]), found["units"], _words(found))
         for name, found in told["observables"].items()
     ]
     lines = ["observables", *_unit_rows(rows)] if rows else ["no observables in this case"]
@@ -139,6 +144,11 @@ def results(told: Mapping[str, Any], changes: str = "") -> str:
             *table(_held(one) for one in told["expected"]),
         ]
     return "\n".join(lines)
+
+
+def _words(found: Mapping[str, Any]) -> str:
+    """The words beside a number: that it does not cover what was asked for, else what it is; and how well it fits."""
+    return (found["note"] or found["description"]) + (f" ({found['quality']})" if found["quality"] else "")
 
 
 def _held(one: Mapping[str, Any]) -> tuple[str, ...]:

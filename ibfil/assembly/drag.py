@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from .stacked import RodStack
 
 
+LEAST_ASPECT = 2.0  # L/2a below which the formulas of a cylinder do not hold
+
+
 def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None) -> tuple[float, float, np.ndarray]:
-    """Drag per length across and along the rod, and against spin (k,): paper, slender (Sec. 7.5), given, matched."""
-    eta, drag = case.fluid.viscosity, case.fluid.drag
+    """Drag per length across and along the rod, and against spin (k,). Raises CaseError for a rod that is too thick."""
+    eta, drag = case.fluid.viscosity, case.fluid.drag_of(radius)
     spin = np.zeros(1) if radius is None else 4 * np.pi * eta * radius**2
     if isinstance(drag, Coefficients):
         return drag.perp, drag.par, spin if drag.spin is None else np.full(1, drag.spin)
@@ -30,12 +33,31 @@ def drag_coefficients(case: Case, filament: Filament, radius: np.ndarray | None)
         if radius is not None and found.spin:
             spin = eta * found.spin * (radius / np.mean(radius)) ** 2
         return eta * found.perp, eta * found.par, spin
+    perp, par = (4 * np.pi, 2 * np.pi) if drag == "paper" else _by_radius(str(drag), filament, radius)
+    thin = drag != "cylinder" or radius is None or filament.length > 2 * LEAST_ASPECT * float(np.mean(radius))
+    if not (thin and perp > 0):
+        raise CaseError(
+            [f'{case.file}: filament.radius: too thick for drag = "{drag}"; give fluid.drag = {{ perp, par }}']
+        )
+    return eta * perp, eta * par, spin
+
+
+def _by_radius(drag: str, filament: Filament, radius: np.ndarray | None) -> tuple[float, float]:
+    """Drag per length and viscosity of a straight rod, across and along, by the mean radius a; p = L/2a.
+
+    slender: 8 pi/ln(L^2/(4 a^2 e)), half of it along (Sec. 7.5).
+    cylinder: 4 pi/(ln p + 0.839 + 0.185/p + 0.233/p^2), 2 pi/(ln p - 0.207 + 0.980/p - 0.133/p^2), of a whole cylinder
+    dragged across and along, ends and all (Tirado & Garcia de la Torre, J. Chem. Phys. 71 (1979) 2581).
+    """
+    if radius is None:
+        raise ValueError(f"{drag} drag needs a radius")
+    p = filament.length / (2 * float(np.mean(radius)))
     if drag == "slender":
-        if radius is None:
-            raise ValueError("slender drag needs a radius")
-        perp = 8 * np.pi * eta / np.log(filament.length**2 / (4 * float(np.mean(radius)) ** 2 * np.e))
-        return perp, 0.5 * perp, spin
-    return 4 * np.pi * eta, 2 * np.pi * eta, spin
+        perp = 8 * np.pi / np.log(p**2 / np.e)
+        return perp, 0.5 * perp
+    across = np.log(p) + 0.839 + 0.185 / p + 0.233 / p**2
+    along = np.log(p) - 0.207 + 0.980 / p - 0.133 / p**2
+    return 4 * np.pi / across, 2 * np.pi / along
 
 
 def matching(case: Case, filament: Filament) -> Match | None:

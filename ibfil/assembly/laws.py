@@ -27,7 +27,7 @@ def law(
     given: Sequence[constitutive.MomentLaw | None],
 ) -> Law:
     """The law of all nodes (n,). ``given`` are laws made in Python, one a filament or None; they go first."""
-    out: Law = _linear(filaments, nodes, s)
+    out: Law = linear(filaments, nodes, s)
     others: list[tuple[slice, Law]] = []
     for filament, where, own in zip(filaments, nodes, given, strict=True):
         if own is not None:
@@ -63,7 +63,8 @@ def _torsion(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarra
     return torsion
 
 
-def _linear(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray) -> constitutive.Linear:
+def linear(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray) -> constitutive.Linear:
+    """Eq. 9 with the moduli and the preferred strains of all nodes."""
     first = field(filaments, nodes, s, lambda f: f.curvature[0])
     curvature = first, field(filaments, nodes, s, lambda f: f.curvature[1])
     rate = field(filaments, nodes, s, lambda f: f.twist_rate)
@@ -73,12 +74,12 @@ def _linear(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray
 def _nonlinear(filament: Filament, s: np.ndarray) -> Law:
     """The law of one filament of nodes s (k,)."""
     it = [filament], [slice(0, len(s))], s
-    linear, chosen = _linear(*it), filament.law
+    plain, chosen = linear(*it), filament.law
     if isinstance(chosen, Stiffening):
-        return constitutive.Stiffening(linear, _bending(*it), _torsion(*it), chosen.coefficient, chosen.exponent)
+        return constitutive.Stiffening(plain, _bending(*it), _torsion(*it), chosen.coefficient, chosen.exponent)
     assert isinstance(chosen, TwoWell)
     rate = field(*it, lambda f: f.twist_rate)
-    return constitutive.TwoWell(linear, rate, chosen.wells, chosen.barrier)
+    return constitutive.TwoWell(plain, rate, chosen.wells, chosen.barrier)
 
 
 def _internal(filament: Filament, part: int) -> Expression:

@@ -18,13 +18,14 @@ from ..case import spacing
 from ..case.filament import copy_name
 from ..errors import CaseError
 from ..rods.base import NoContact
-from ..rods.boundary_conditions import PrescribedEnd, PrescribedEnds, Turn, spinning, steady, turned
 from ..rods.mesh import Segmented, stack
-from ..rods.system import RodSystem
 from ..shapes import copies, initial
 from . import laws
-from .loads import loads, number, triple
+from .ends import prescribed_ends
+from .kinds import rod_system
+from .loads import loads
 from .profiles import along, half
+from .rest import settled
 from .stacked import RodStack
 
 if TYPE_CHECKING:
@@ -33,19 +34,7 @@ if TYPE_CHECKING:
     from ..rods.constitutive import MomentLaw
     from ..rods.contact import Contact
     from ..rods.links.base import Link
-
-
-def _turn(end) -> Turn | None:
-    """How e1 turns at a held end; None where it is free."""
-    if not end.turn_held:
-        return None
-    if end.angle is not None:
-        return turned(number(end.angle))
-    if end.spin is None:
-        return steady(0.0)
-    if end.spin.constant is not None:
-        return steady(end.spin.constant)
-    return spinning(number(end.spin))
+    from ..rods.system import RodSystem
 
 
 Tangents = tuple[np.ndarray | None, np.ndarray | None]
@@ -59,13 +48,7 @@ class Placed(NamedTuple):
     s: np.ndarray
     r: np.ndarray
     e1: np.ndarray
-    held: tuple[np.ndarray | None, ...]
-
-    def segmented(self, thermal: bool) -> Segmented:
-        """It for the stack. Equipartition asks for a symmetric stiffness, which order 2 has with ghost nodes."""
-        derivative = self.filament.derivative
-        ghost = thermal and derivative == 2
-        return Segmented(self.s, derivative, self.held[0], self.held[1], ghost, self.filament.closed)
+    held: Tangents
 
 
 class _Stacked(NamedTuple):
@@ -97,16 +80,17 @@ def _place(case: Case) -> list[Placed]:
     for name, filament in case.filaments.items():
         key, folder = f"{case.file}: filament.{name}", Path(case.file).parent
         s = spacing.node_arclength(filament, key)
-        r, e1 = initial.initial_shape(filament, key, folder)
         held = _clamp_tangents(filament, key, folder)
+        segmented = _segmented(filament, s, held, case.thermal is not None)
+        r, e1 = initial.initial_shape(filament, key, folder, partial(settled, filament, segmented))
         if filament.copies is None:
             out.append(Placed(name, filament, s, r, e1, held))
             continue
         about = _centre(case, name)
         for k, turn, shift in copies.places(filament.copies, about, key, folder):
             moved = (r - about) @ turn.T + shift
-            turned = tuple(None if t is None else turn @ t for t in held)
-            out.append(Placed(copy_name(name, k), filament, s, moved, e1 @ turn.T, turned))
+            first, last = (None if t is None else turn @ t for t in held)
+            out.append(Placed(copy_name(name, k), filament, s, moved, e1 @ turn.T, (first, last)))
     return out
 
 
@@ -133,19 +117,10 @@ def _clamp_tangents(filament: Filament, key: str, folder: Path) -> Tangents:
     return held[0], held[1]
 
 
-def _ends(filaments, nodes, ranges, unknowns: int) -> tuple[PrescribedEnds, np.ndarray]:
-    """The held unknowns, and the mask (n,) of end nodes that carry no moment."""
-    held, free = [], np.zeros(ranges[-1].stop, bool)
-    idle: list[int] = []
-    for filament, where, every in zip(filaments, nodes, ranges, strict=True):
-        for end, node in ((filament.start, where.start), (filament.finish, where.stop - 1)):
-            free[node] = not end.clamped and not filament.closed
-            if end.held:
-                moves = None if end.moves is None else triple(end.moves, "t")
-                held.append(PrescribedEnd(node, _turn(end), moves))
-        if unknowns == 4 and filament.twisting is None:
-            idle += range(every.start, every.stop)
-    return PrescribedEnds(held, unknowns, np.array(idle, np.int64)), free
+def _segmented(filament: Filament, s: np.ndarray, held: Tangents, thermal: bool) -> Segmented:
+    """A filament for the stack. Equipartition asks for a symmetric stiffness, which order 2 has with ghost nodes."""
+    ghost = thermal and filament.derivative == 2
+    return Segmented(s, filament.derivative, *held, ghost, filament.closed)
 
 
 def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> RodStack:
@@ -157,14 +132,14 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
         raise CaseError([f"{case.file}: laws: found {name}; allowed: one of {', '.join(case.filaments)}"])
     placed = _place(case)
     filaments, positions = tuple(p.filament for p in placed), [p.r for p in placed]
-    parts = [p.segmented(case.thermal is not None) for p in placed]
+    parts = [_segmented(p.filament, p.s, p.held, case.thermal is not None) for p in placed]
     stacked = _Stacked.of(parts)
     nodes, ranges = stacked.nodes, stacked.ranges
     s, mesh = stacked.whole([p.s for p in placed]), stack(parts)
     for where, p in zip(nodes, placed, strict=True):
         s[where] = p.s  # of the last node of a closed rod its length, not 0
     unknowns = 4 if any(f.twisting is not None for f in filaments) else 3
-    ends, free = _ends(filaments, nodes, ranges, unknowns)
+    ends, free = prescribed_ends(filaments, nodes, ranges, unknowns)
     own = [next((law for name, law in given.items() if case.filaments[name] is f), None) for f in filaments]
     law = laws.law(filaments, ranges, s, mesh, own)
     stretching = half(along(filaments, ranges, s, lambda f: f.stretching))
@@ -191,12 +166,8 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
 
 def _kind(filaments: tuple[Filament, ...], stacked: _Stacked) -> Callable[..., RodSystem]:
     """The class of the rods: open, closed or of the torque-free force."""
-    if filaments[0].force == "torque-free":
-        from ..rods.torque_free import TorqueFree
-
-        return TorqueFree
     if not any(f.closed for f in filaments):
-        return RodSystem
+        return rod_system(filaments[0])
     from ..rods.closed import ClosedRods
 
     closures = [(w.start, w.stop - 1) for f, w in zip(filaments, stacked.nodes, strict=True) if f.closed]

@@ -213,15 +213,24 @@ class Filament(Table):
     law: Law = Field(Linear(), description="moment against strain")
     curvature: PairST = Field((ZERO, ZERO), description="preferred curvatures kappa1, kappa2")
     twist_rate: OfST = Field(ZERO, description="preferred twist tau0")
-    position: Vector = Field(ORIGIN, description="where anchor stands; the box is centred on the origin")
+    position: Vector = Field(
+        ORIGIN,
+        description="where anchor stands; the box is centred on the origin; shapes expression and file stay where they "
+        "are without it",
+    )
     anchor: Literal["start", "middle", "centroid"] = Field("middle", description="the point put at position")
-    direction: Vector = Field((1.0, 0.0, 0.0), description="where align points")
+    direction: Vector = Field(
+        (1.0, 0.0, 0.0),
+        description="where align points; expression and file are turned only where direction or align is given",
+    )
     align: Literal["auto", "axis", "tangent", "chord"] = Field(
         "auto",
         description="what points along direction; auto: axis for helix and relaxed, else tangent (e3(0))",
     )
     normal: Vector = Field(
-        (0.0, 0.0, 1.0), description="e1 at s = 0, made normal to e3; [0, 1, 0] by default where direction is along z"
+        (0.0, 0.0, 1.0),
+        description="e1 at s = 0, made normal to e3; [0, 1, 0] by default where direction is along z; of points that "
+        "are not turned those of the file, or along z, or x, by default",
     )
     copies: Copies | None = Field(None, description="many of them, called NAME_000, NAME_001 ...")
     shape: AnyShape = Field(Straight(), description="shape at t = 0")
@@ -237,6 +246,21 @@ class Filament(Table):
     def keeps_no_plane(self) -> bool:
         """Whether it is round and naturally straight: without twisting it then bends in any plane."""
         return self.bending[0] == self.bending[1] and all(kappa.constant == 0.0 for kappa in self.curvature)
+
+    @property
+    def moved(self) -> bool:
+        """Whether the shape is moved to ``position``: points given in the lab frame only where it is asked."""
+        return not self.shape.in_place or not {"position", "anchor"}.isdisjoint(self.model_fields_set)
+
+    @property
+    def turned(self) -> bool:
+        """Whether the shape is turned to ``direction``: points given in the lab frame only where it is asked."""
+        return not self.shape.in_place or not {"direction", "align"}.isdisjoint(self.model_fields_set)
+
+    @property
+    def own_normal(self) -> bool:
+        """Whether e1 at s = 0 is the one that the shape's points come with."""
+        return not self.turned and "normal" not in self.model_fields_set
 
     @property
     def aligned(self) -> str:

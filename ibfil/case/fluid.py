@@ -72,11 +72,15 @@ class Fluid(Table):
         None, description="background velocity; navier-stokes: uniform or box-periodic, maintained"
     )
     drag: Annotated[
-        Annotated[Literal["paper", "slender"], tagged("word")]
+        Annotated[Literal["auto", "cylinder", "slender", "paper"], tagged("word")]
         | Annotated[Matched, tagged("matched")]
         | Annotated[Coefficients, tagged("coefficients")],
         Discriminator(_drag),
-    ] = Field("paper", description="rft: 4 pi eta, 2 pi eta | slender body | matched to the grid | given")
+    ] = Field(
+        "auto",
+        description="rft: that of a straight cylinder of this radius | slender body, by the radius | paper: 4 pi eta, "
+        "2 pi eta, whatever the radius | matched to the grid | given; auto: cylinder where there is a radius, or paper",
+    )
     thick: Annotated[
         Annotated[bool, Strict(), tagged("word")] | Annotated[Thick, tagged("table")],
         Discriminator(lambda value: "<table>" if isinstance(value, dict | Thick) else "<word>"),
@@ -172,6 +176,12 @@ class Fluid(Table):
     def single(self) -> bool:
         """Whether tables, and fields with inertia, are of single precision."""
         return self.precision == "single"
+
+    def drag_of(self, radius: object | None) -> str | Matched | Coefficients:
+        """The drag of a rod with this radius, or None: no rod has the drag "auto"."""
+        if self.drag != "auto":
+            return self.drag
+        return "paper" if radius is None or self.on_grid else "cylinder"
 
     @property
     def drag_matched(self) -> Matched | None:

@@ -7,8 +7,9 @@ before a case is read, and the text here says so.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
@@ -105,6 +106,15 @@ class Stop(Table):
     hold: NotNegative = Field(0.0, description="must hold so long")
 
 
+# Kinds whose number is fitted to a series, and the name of that.
+_FITTED_TO = {
+    "drift": "position",
+    "growth": "amplitude",
+    "circularity": "position",
+    "frequency": "position_seen",
+}
+
+
 class Observe(Table):
     """A number (or vector) taken at every output."""
 
@@ -142,7 +152,12 @@ class Observe(Table):
     at: Annotated[
         float | tuple[float, float] | Literal["start", "finish", "middle", "centroid"],
         Place(("start", "finish", "middle", "centroid")),
-    ] = Field("finish", description="where: a point, an arclength, or a window [s1, s2]")
+    ] = Field(
+        "finish",
+        description="where: a point, an arclength, or a window [s1, s2]; by default the centroid for position, "
+        "velocity, displacement, speed, drift and diffusion_ratio, the whole filament for radius, force, torque and "
+        "power",
+    )
     along: Vector | None = Field(None, description="component or axis, where the kind has one")
     space: Literal["none", "mean", "max", "min"] = Field("none", description="over the window")
     over: Range | None = Field(None, description="time window; absent: the whole run")
@@ -165,6 +180,15 @@ class Observe(Table):
     def of_link(self) -> bool:
         """Whether it looks at a link, and at no filament."""
         return self.kind.startswith("link_")
+
+    @property
+    def series(self) -> str:
+        """The quantity whose series is kept, where the observable itself is a number fitted to that; "" else."""
+        return _FITTED_TO.get(self.kind, "")
+
+    def recorded(self, name: str) -> str:
+        """The name of the series of an observable called ``name``: of a drift U it is U.position."""
+        return f"{name}.{self.series}" if self.series else name
 
     @property
     def reduces(self) -> bool:
@@ -272,3 +296,10 @@ class Case(Scene):
         named = [getattr(f.shape, "path", None) for f in self.filaments.values()]
         named += [f.copies.file for f in self.filaments.values() if f.copies is not None]
         return [Path(self.file), *(Path(self.file).parent / name for name in named if name)]
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy. Raises TypeError with ``update``: it would not be checked, nor be in the text that is recorded."""
+        if update:
+            keys = ", ".join(f"{key}=..." for key in update)
+            raise TypeError(f"a case is changed by overrides: ibfil.parse_case(case.text, case.file, ['{keys}'])")
+        return super().model_copy(deep=deep)

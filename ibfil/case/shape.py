@@ -37,6 +37,7 @@ class Shape(Table):
     noise: Noise | None = Field(None, description="smooth random perturbation, zero at held ends")
 
     has_axis: ClassVar[bool] = False  # whether the shape has one by its nature, as a helix does
+    in_place: ClassVar[bool] = False  # whether its points are meant where they are, in the lab frame
 
 
 class Straight(Shape):
@@ -81,14 +82,22 @@ class Circle(Shape):
 class ExpressionShape(Shape):
     """A curve given by three expressions."""
 
-    kind: Literal["expression"] = Field("expression", description="a curve given by three expressions")
+    in_place = True
+
+    kind: Literal["expression"] = Field(
+        "expression", description="a curve given by three expressions; stays where they put it, see position, direction"
+    )
     r: TripleS = Field(description="position", examples=[["s", 0, 0]])
 
 
 class FileShape(Shape):
     """Nodes read from a file."""
 
-    kind: Literal["file"] = Field("file", description="points read from a file")
+    in_place = True
+
+    kind: Literal["file"] = Field(
+        "file", description="points read from a file; they stay where they are, see position, direction"
+    )
     path: str = Field(description="csv or npy: x, y, z[, e1x, e1y, e1z], relative to the case", examples=["points.csv"])
 
 

@@ -68,6 +68,8 @@ def modelled(case: Case) -> list[str]:
         if f.closed:
             terms.append("closed" + ("" if f.linking is None else f", linking number {f.linking}"))
         terms += [row.words for row in named(ALONG, f.loads)]
+        if not (f.moved or f.turned):
+            terms.append("standing where its points are given (0.1.0 moved and turned them to position and direction)")
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     out += [f"link {name}: {link.words}" for name, link in case.links.items()]
     if case.fluid.flow is not None:

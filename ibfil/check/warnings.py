@@ -197,6 +197,20 @@ def _of_noisy_step(simulation: Simulation) -> list[str]:
     return out
 
 
+def _of_windows(case: Case) -> list[str]:
+    """Windows of observables that the run does not fill."""
+    out = []
+    for name, one in case.observe.items():
+        if one.over is None or one.over[1] <= case.time.end * (1 + 1e-9):
+            continue
+        if one.over[0] >= case.time.end:
+            what = f"it begins at {one.over[0]:g}, not before time.end = {case.time.end:g}: there will be no number"
+        else:
+            what = f"it ends at {one.over[1]:g}, beyond time.end = {case.time.end:g}"
+        out.append(f"observe.{name}.over: {what}")
+    return out
+
+
 def _of_run(simulation: Simulation) -> list[str]:
     case, out = simulation.case, _of_noise(simulation)
     if case.time.explicit and not case.time.automatic:
@@ -208,6 +222,7 @@ def _of_run(simulation: Simulation) -> list[str]:
         out.append(
             f"output.every: {every:g} is beyond time.end = {case.time.end:g}: only the start and the end are written"
         )
+    out += _of_windows(case)
     touching = simulation.rods.contact.diagnostics(simulation.configuration.r).get("contacts", 0.0)
     if touching:
         out.append(f"contact: {touching:.0f} pairs of segments touch at the start")

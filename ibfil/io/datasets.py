@@ -11,8 +11,15 @@ from .snapshots import Snapshot
 # Dataset -> its dimension (units.py) and description.
 _FILAMENT = {
     "position": ("length", "positions of the nodes, unwrapped"),
-    "velocity": ("length/time", "velocities of the nodes"),
-    "force": ("force", "force of each node on the fluid, reactions of supports included"),
+    "velocity": (
+        "length/time",
+        "velocities of the nodes over the step to the output, at t = 0 over the first",
+    ),
+    "force": (
+        "force",
+        "force of each node on the fluid over the step that led to the output, at t = 0 over the first; reactions of "
+        "supports included",
+    ),
     "e1": ("1", "first material director at the nodes"),
     "moment": ("force length", "internal moment at the nodes along e1, e2, e3"),
     "strain": ("1/length", "strains Omega_1, Omega_2, Omega_3 at the nodes"),
@@ -39,7 +46,7 @@ _DIAGNOSTICS = {
     "net_torque": ("force length", "total torque on the fluid"),
     "stretch_max": ("1", "largest stretch of a segment, length over rest length minus 1"),
     "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
-    "power": ("force length/time", "power of the nodal forces and twist torques on the fluid"),
+    "power": ("force length/time", "power of the nodal forces and twist torques on the fluid over that step"),
     "kinetic_energy": ("force length", "kinetic energy of the rods' mass and rotary inertia"),
     "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
     "couple_dissipation": ("force length/time", "the part of it by the couple of flows across the rods' thickness"),

@@ -135,8 +135,9 @@ class RunFile:
 
     @cached_property
     def observables(self) -> dict[str, Column]:
-        """Observable -> Column (T,) or (T, 3)."""
-        return self._columns("observables")
+        """Series -> Column (T,) or (T, 3): of an observable by its name, of one fitted to a series as NAME.SERIES."""
+        observe, found = self.case.observe, self._columns("observables").items()
+        return {observe[name].recorded(name) if name in observe else name: column for name, column in found}
 
     @cached_property
     def diagnostics(self) -> dict[str, Column]:
@@ -249,11 +250,15 @@ class RunFile:
 
     def units(self, path: str) -> str:
         """Return the label of a dataset's unit, as in ``run.units("filaments/rod/velocity")``."""
-        return str(self._file[path].attrs["units"])
+        return str(self._file[self._kept(path)].attrs["units"])
 
     def description(self, path: str) -> str:
         """Return what a dataset is, in words."""
-        return str(self._file[path].attrs["description"])
+        return str(self._file[self._kept(path)].attrs["description"])
+
+    def _kept(self, path: str) -> str:
+        """The path of a dataset in the file: before 0.2 a fit's series had the name of the fit."""
+        return path if path in self._file else path.rpartition(".")[0] or path
 
     def visit(self, look: Callable[[str, h5py.Dataset | h5py.Group], None]) -> None:
         """Shows every group and dataset of the file."""

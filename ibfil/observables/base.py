@@ -123,16 +123,20 @@ class ObservableBase:
                 allowed = f"nothing; {observe.kind} has {', '.join(self.keys)}"
                 raise Unfit(key, getattr(observe, key), allowed)
         self.filament = observe.filament
-        self.over, self._how = observe.over, observe.summary
+        self.over, self._how, self.recorded = observe.over, observe.summary, observe.recorded
         along = observe.along or self.along
         self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
-        details = [f"{key} = {_shown(getattr(observe, key))}" for key in ("at", "along", "space") if key in given]
+        details = [f"{key} = {_shown(value)}" for key, value in self.details(observe).items()]
         whose = "all filaments" if observe.together else observe.link or observe.filament
         self.description = ", ".join([f"{self.description} of {whose}", *details])
         how = "" if self.fitted else _SUMMARIES[observe.summary].words
         over = [] if observe.over is None else [f"over = {_shown(observe.over)}"]
         what = f"{self.number or how + type(self).description} of {whose}"
         self.words = ", ".join([what, *details, *over])
+
+    def details(self, observe: Observe) -> dict[str, object]:
+        """Where and along what it looks, by key: what is told beside its name."""
+        return {key: getattr(observe, key) for key in ("at", "along", "space") if key in observe.model_fields_set}
 
     def sample(self, snapshot: Snapshot) -> Value:
         """Value at one output."""
@@ -157,6 +161,10 @@ class ObservableBase:
         """Return the last, mean (over time), max, min or median of the outputs in `over`."""
         start, end = self.window(times)
         return plain(_SUMMARIES[self._how].of(times, samples, start, end))
+
+    def quality(self, times: np.ndarray, samples: np.ndarray) -> str:
+        """How well the summary fits the series, or why there is none; "" where nothing is fitted."""
+        return ""
 
 
 KINDS: dict[str, type[ObservableBase]] = {}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..errors import CaseError
 from .base import KINDS, Observable, Unfit
-from .observers import ObservableSet
+from .observers import ObservableSet, Summary, summaries
 
 if TYPE_CHECKING:
     from ..case.schema import Case
@@ -19,7 +21,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
 
     Raises CaseError, a line for each observable or stop rule that asks for what its kind does not have.
     """
-    from . import closed, fitted, linked, local, together  # noqa: F401  (they fill KINDS)
+    from . import closed, fitted, linked, local, together, windowed  # noqa: F401  (they fill KINDS)
     from .stop_rules import stop_faults
 
     made: dict[str, Observable] = {}
@@ -37,9 +39,16 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
     return ObservableSet(made)
 
 
+def numbers_of(case: Case, times: np.ndarray, series: Mapping[str, Any]) -> dict[str, Summary]:
+    """The numbers of all observables of a case from recorded series, by name; ``series`` as a run file names them."""
+    observables = observers(case).observables
+    values = {name: np.asarray(series[case.observe[name].recorded(name)]) for name in observables}
+    return summaries(observables, times, values)
+
+
 def kinds_text() -> str:
     """The kinds of observables and their keys, for `ibfil schema`."""
-    from . import closed, fitted, linked, local, together  # noqa: F401  (they fill KINDS)
+    from . import closed, fitted, linked, local, together, windowed  # noqa: F401  (they fill KINDS)
 
     lines = ["The kinds of [observe.NAME]: what each takes at an output, or of the run, and the keys it has"]
     for name, kind in KINDS.items():

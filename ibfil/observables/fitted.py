@@ -61,6 +61,13 @@ class Growth(Amplitude, kind="growth"):
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the rate over `over`."""
+        return self._fit(times, samples).value
+
+    def quality(self, times: np.ndarray, samples: np.ndarray) -> str:
+        """How well the rate fits, or why there is none."""
+        return self._fit(times, samples).quality
+
+    def _fit(self, times: np.ndarray, samples: np.ndarray) -> time_series.Fit:
         return time_series.growth(*time_series.cut(times, samples, *self.window(times)))
 
 
@@ -68,6 +75,7 @@ class AcrossAxis(AtPlace):
     """A fit to the motion in the plane across `along` (default x). The series (T, 3) is the vector seen."""
 
     keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", "over")
+    default_at = "finish"
     along = (1.0, 0.0, 0.0)
     fitted = True
     mean_only = True
@@ -129,7 +137,11 @@ class Frequency(AcrossAxis, kind="frequency"):
 
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the rate over `over`."""
-        return time_series.angular_rate(*self.seen(times, samples))
+        return time_series.angular_rate(*self.seen(times, samples)).value
+
+    def quality(self, times: np.ndarray, samples: np.ndarray) -> str:
+        """How well the rate fits, or why there is none."""
+        return time_series.angular_rate(*self.seen(times, samples)).quality
 
 
 class DiffusionRatio(AtPlace, kind="diffusion_ratio"):
@@ -142,7 +154,6 @@ class DiffusionRatio(AtPlace, kind="diffusion_ratio"):
 
     keys = ("at", "space", "interval", "over")
     mean_only = True
-    default_at = "centroid"
     description = "diffusion across over along the gyration axis, so far,"
     number = "diffusion across over along the gyration axis"
 

@@ -27,7 +27,6 @@ POINTS = "start, finish, middle, an arclength or a window [s1, s2]"
 
 
 MEANS, WINDOWS = ("mean",), ("mean", "max", "min")  # what may be asked of the points of a window
-SUPPORTS = {"start": (-1.0, 0), "finish": (1.0, -1)}  # sign of the moment that a support gives, and its node
 
 
 class OfFilament(ObservableBase):
@@ -53,7 +52,7 @@ class AtPlace(OfFilament):
     """A kind that looks at a point, or at a window through `space`."""
 
     keys: ClassVar[tuple[str, ...]] = ("at", "space", *SUMMARY)
-    default_at: ClassVar[str] = "finish"
+    default_at: ClassVar[str] = "centroid"  # where one looks for what is said of a filament as a whole
     refused: ClassVar[tuple[str, ...]] = ()  # names of places that mean nothing here
     mean_only: ClassVar[bool] = False  # of a window
 
@@ -69,6 +68,11 @@ class AtPlace(OfFilament):
             more = "" if self.mean_only or not self.vector else '; "max" and "min" with `along`'
             raise Unfit("space", self.space, f"{words} where `at` is a window{more}")
         self.location = Location(self.s, self.at)
+
+    def details(self, observe: Observe) -> dict[str, object]:
+        """Where it looks, always."""
+        found = super().details(observe)
+        return {"at": found.get("at", self.default_at), **found}
 
     def point(self, field: np.ndarray) -> np.ndarray:
         """Return a nodal field (N, 3) at the point, or its mean over the window: (3,)."""
@@ -104,7 +108,7 @@ class Position(Component, kind="position"):
 
 
 class Velocity(Component, kind="velocity"):
-    """Velocity u, or its component."""
+    """Velocity u, or its component, over the step that led to the output (at t = 0: over the first)."""
 
     dimension = "length/time"
     description = "velocity"
@@ -133,7 +137,7 @@ class Displacement(Component, kind="displacement"):
 
 
 class Speed(AtPlace, kind="speed"):
-    """Size of the velocity, |u|."""
+    """Size of the velocity |u|, that of the point; `drift` and `velocity` along a direction tell how fast one swims."""
 
     dimension = "length/time"
     description = "speed"
@@ -148,6 +152,7 @@ class Amplitude(AtPlace, kind="amplitude"):
     """Distance from the line through the node at s = 0 along `along` (default x)."""
 
     keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", *SUMMARY)
+    default_at = "finish"
     along = (1.0, 0.0, 0.0)
     dimension = "length"
     description = "distance from the line through the start"
@@ -155,13 +160,14 @@ class Amplitude(AtPlace, kind="amplitude"):
     def sample(self, snapshot: Snapshot) -> Value:
         """At one output."""
         position = self.look(snapshot).position
-        across = _distance_across(self.location.values(position) - position[0], self.axis)
+        across = distance_across(self.location.values(position) - position[0], self.axis)
         return float(self.location.reduced(across, self.space))
 
 
 class Twist(AtPlace, kind="twist"):
     """Strain Omega_3."""
 
+    default_at = "finish"
     refused = ("centroid",)
     dimension = "rad/length"
     description = "twist Omega_3"
@@ -178,6 +184,7 @@ class Stretch(AtPlace, kind="stretch"):
     In a window: of the segments whose middles lie in it.
     """
 
+    default_at = "finish"
     refused = ("centroid",)
     description = "stretch of the segments"
 
@@ -246,127 +253,7 @@ class TurnAngle(OfFilament, kind="turn_angle"):
         return self._last
 
 
-class Windowed(OfFilament):
-    """A kind that looks at the nodes of a window, by default the whole filament."""
-
-    keys: ClassVar[tuple[str, ...]] = ("at", *SUMMARY)
-    supports: ClassVar[bool] = False  # whether start and finish stand for the supports there
-
-    def __init__(self, case: Case, observe: Observe) -> None:
-        super().__init__(case, observe)
-        at = observe.at if "at" in observe.model_fields_set else (0.0, self.length)
-        self.at: tuple[float, float] = (0.0, self.length)
-        self.end = ""
-        if isinstance(at, tuple):
-            self.at = at
-        elif self.supports and at in SUPPORTS:
-            self.end = str(at)
-            if not getattr(self.model, self.end).held:
-                raise Unfit("at", at, "an end that is held; a free end has no support")
-        else:
-            words = '"start" or "finish" for the support there, ' if self.supports else ""
-            raise Unfit("at", at, f"{words}a window [s1, s2], or nothing for the whole filament")
-        slack = 1e-9 * self.length
-        self.inside = (self.s >= self.at[0] - slack) & (self.s <= self.at[1] + slack)
-
-
-class Radius(Windowed, kind="radius"):
-    """Distance of a window's points from its centroid, across `along` (default x): their mean, max or min."""
-
-    keys: ClassVar[tuple[str, ...]] = ("at", "space", "along", *SUMMARY)
-    along = (1.0, 0.0, 0.0)
-    dimension = "length"
-    description = "distance from the centroid, across the axis"
-
-    def __init__(self, case: Case, observe: Observe) -> None:
-        super().__init__(case, observe)
-        self.space = observe.space
-        if not observe.reduces:
-            raise Unfit("space", self.space, '"mean", "max" or "min"')
-        self.location = Location(self.s, self.at)
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        points = self.location.values(self.look(snapshot).position)
-        across = _distance_across(points - self.location.reduced(points, "mean"), self.axis)
-        return float(self.location.reduced(across, self.space))
-
-
-class OnFluid(Windowed):
-    """A vector or its component: summed over the nodes of a window, or of the support of an end."""
-
-    keys: ClassVar[tuple[str, ...]] = ("at", "along", *SUMMARY)
-    supports = True
-
-    @property
-    def vector(self) -> bool:
-        """Without `along`."""
-        return self.axis is None
-
-    def component(self, value: np.ndarray) -> Value:
-        """Return the component of a vector (3,), or itself."""
-        return value if self.axis is None else float(value @ self.axis)
-
-
-class Force(OnFluid, kind="force"):
-    """Force of a window's nodes on the fluid; at start or finish, of the support there on the filament."""
-
-    dimension = "force"
-    description = "force"
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        filament = self.look(snapshot)
-        if self.end:
-            return self.component(getattr(filament, f"reaction_{self.end}"))
-        return self.component(filament.force[self.inside].sum(axis=0))
-
-
-class Torque(OnFluid, kind="torque"):
-    """Torque of a window's nodal forces on the fluid about the filament's centroid, twist torques included.
-
-    At start or finish: the couple of the support there on the filament, -M(0) or M(L).
-    """
-
-    dimension = "force length"
-    description = "torque"
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        filament = self.look(snapshot)
-        if self.end:
-            sign, node = SUPPORTS[self.end]
-            return self.component(sign * _lab_moment(filament, self.s, node))
-        arms = filament.position - self.share @ filament.position
-        torque = np.cross(arms, filament.force)
-        if filament.torque is not None:
-            torque = torque + filament.torque
-        return self.component(torque[self.inside].sum(axis=0))
-
-
-class Power(Windowed, kind="power"):
-    """Power of a window's nodal forces and twist torques on the fluid, sum of F.u + T.w."""
-
-    dimension = "force length/time"
-    description = "power on the fluid"
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        filament = self.look(snapshot)
-        return float(np.sum(filament.power[self.inside]))
-
-
-def _distance_across(points: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
+def distance_across(points: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
     """Distance (m,) of points (m, 3) from the line through the origin along ``axis``."""
     assert axis is not None  # these kinds have a default
     return np.linalg.norm(np.cross(points, axis), axis=1)
-
-
-def _lab_moment(filament: FilamentSnapshot, s: np.ndarray, node: int) -> np.ndarray:
-    """Moment (3,) at an end node in the lab frame; its tangent by one-sided differences of second order."""
-    three = slice(0, 3) if node == 0 else slice(-3, None)
-    e1 = filament.e1[node]
-    tangent = np.gradient(filament.position[three], s[three], axis=0, edge_order=2)[node]
-    tangent = tangent - (tangent @ e1) * e1
-    e3 = tangent / np.linalg.norm(tangent)
-    return filament.moment[node] @ np.array([e1, np.cross(e3, e1), e3])

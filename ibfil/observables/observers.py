@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Summary:
-    """The number of one observable; ``note`` is not empty where it does not cover all that was asked for."""
+    """The number of one observable; ``note`` is not empty where it does not cover all that was asked for.
+
+    ``quality`` tells of a number that is fitted how well it fits, or why there is none.
+    """
 
     value: Value
     note: str = ""
+    quality: str = ""
 
 
 class ObservableSet:
@@ -32,12 +36,16 @@ class ObservableSet:
         self._series: dict[str, list[Value]] = {name: [] for name in observables}
 
     def record(self, snapshot: Snapshot) -> dict[str, Value]:
-        """Look at one output; the values by name."""
+        """Look at one output; the values by the names of their series."""
         values = {name: observable.sample(snapshot) for name, observable in self.observables.items()}
         self._times.append(snapshot.time)
         for name, value in values.items():
             self._series[name].append(value)
-        return values
+        return {self.recorded(name): value for name, value in values.items()}
+
+    def recorded(self, name: str) -> str:
+        """The name of an observable's series: its own, unless it is a number fitted to another quantity."""
+        return str(getattr(self.observables[name], "recorded", lambda own: own)(name))
 
     @property
     def times(self) -> np.ndarray:
@@ -62,6 +70,10 @@ class ObservableSet:
         return summaries(self.observables, self.times, {name: self.series(name) for name in self.observables})
 
 
+def _no_fit(times: np.ndarray, samples: np.ndarray) -> str:
+    return ""
+
+
 def summaries(
     observables: Mapping[str, Observable], times: np.ndarray, series: Mapping[str, np.ndarray]
 ) -> dict[str, Summary]:
@@ -73,7 +85,9 @@ def summaries(
         value: Value = float("nan") if samples.ndim == 1 else np.full(3, np.nan)
         if over is not None and end < over[1] - 1e-9 * abs(over[1]):
             note = f"the run ended at {end:.6g}, within `over` = {_shown(over)}"
+        quality = ""
         if over is None or end >= over[0]:
             value = observable.summary(times, samples)
-        found[name] = Summary(value, note)
+            quality = getattr(observable, "quality", _no_fit)(times, samples)
+        found[name] = Summary(value, note, quality)
     return found

@@ -5,11 +5,16 @@ Times (T,) increase, evenly or not.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 TURNING = 0.9  # of all turning must be one way for a motion to count as rotation
 PLANAR = 0.05  # an orbit whose axes are further apart than 1 : 20 is an oscillation in a plane
 HARMONICS = 3
+POOR = 0.1  # of all growth, in e-foldings: what a fit may leave of it
+POOR_OSCILLATION = 0.3  # of an oscillation: the same
+FAST = 0.75 * np.pi  # between two outputs: a rotation that may be one the other way
 _TURNS = 6  # of fitting an ellipse and its growth in turn
 
 
@@ -74,7 +79,14 @@ def slope(x: np.ndarray, y: np.ndarray) -> float:
     return float(d @ (y - y.mean()) / (d @ d))
 
 
-def growth(times: np.ndarray, amplitude: np.ndarray) -> float:
+class Fit(NamedTuple):
+    """A number fitted to a series, and how well: what it rests on and what it leaves, or why there is none."""
+
+    value: float
+    quality: str
+
+
+def growth(times: np.ndarray, amplitude: np.ndarray) -> Fit:
     """Rate of exponential growth of an amplitude (T,) >= 0, by least squares on its logarithm.
 
     Where the amplitude has three peaks or more it oscillates, and the line goes through its peaks (each
@@ -83,11 +95,16 @@ def growth(times: np.ndarray, amplitude: np.ndarray) -> float:
     seen = amplitude > 0
     t, y = times[seen], np.log(amplitude[seen])
     if len(t) < 3:
-        return float("nan")
-    peaks = 1 + np.nonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))[0]
+        return Fit(float("nan"), f"no growth of {len(t)} outputs that are not zero: it takes three")
+    peaks, what = 1 + np.nonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))[0], "outputs"
     if len(peaks) >= 3:
         t, y = np.transpose([_summit(t[i - 1 : i + 2], y[i - 1 : i + 2]) for i in peaks])
-    return slope(t, y)
+        what = "peaks"
+    rate = slope(t, y)
+    left = float(np.std(y - rate * t))
+    folds = abs(rate) * (t[-1] - t[0])
+    poor = "; hardly exponential" if left > POOR * folds else ""
+    return Fit(rate, f"from {len(t)} {what} over {folds:.2g} e-foldings, to {100 * left:.2g} % (rms){poor}")
 
 
 def _summit(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -98,7 +115,7 @@ def _summit(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     return float(top), float(y[1] + (top - t[1]) * (left + bend * (top - t[0])))
 
 
-def angular_rate(times: np.ndarray, xy: np.ndarray) -> float:
+def angular_rate(times: np.ndarray, xy: np.ndarray) -> Fit:
     """Angular frequency, radians per time, of points (T, 2) seen from the axis (0, 0).
 
     Rotation (an orbit about the axis that turns one way): the least-squares slope of the angle, positive from
@@ -107,15 +124,21 @@ def angular_rate(times: np.ndarray, xy: np.ndarray) -> float:
     period.
     """
     if len(times) < 4:
-        return float("nan")
+        return Fit(float("nan"), f"no frequency of {len(times)} outputs: it takes four")
     squares, _ = axes_of_orbit(times, xy, np.zeros(2))
     if squares[0] > PLANAR**2 * squares[1]:
         angle = turning_angle(times, xy)
         if abs(angle[-1] - angle[0]) > TURNING * np.abs(np.diff(angle)).sum():
-            return slope(times, angle)
+            rate = slope(times, angle)
+            turns, left = abs(angle[-1] - angle[0]) / (2 * np.pi), float(np.std(angle - rate * times))
+            fast = np.max(np.abs(np.diff(angle))) > FAST
+            more = "; outputs are too far apart to be sure of the way it turns" if fast else ""
+            return Fit(rate, f"a rotation, {turns:.2g} turns, to {left:.2g} rad (rms){more}")
     centre = _shares(times) @ xy
     squares, axes = axes_of_orbit(times, xy, centre)
-    return oscillation(times, (xy - centre) @ axes[:, 1]) if squares[1] > 0 else float("nan")
+    if not squares[1] > 0:
+        return Fit(float("nan"), "no frequency: nothing moves")
+    return oscillation(times, (xy - centre) @ axes[:, 1])
 
 
 def turning_angle(times: np.ndarray, xy: np.ndarray) -> np.ndarray:
@@ -139,7 +162,7 @@ def turning_angle(times: np.ndarray, xy: np.ndarray) -> np.ndarray:
     return np.unwrap(np.arctan2(turned[:, 1], turned[:, 0]))
 
 
-def oscillation(times: np.ndarray, values: np.ndarray) -> float:
+def oscillation(times: np.ndarray, values: np.ndarray) -> Fit:
     """Angular frequency of the main component of ``values`` (T,); NaN where there is no whole period.
 
     Guessed from the highest peak of the spectrum, then fitted by least squares: a constant and up to three
@@ -152,7 +175,7 @@ def oscillation(times: np.ndarray, values: np.ndarray) -> float:
     guess = _spectral_peak(t, values)
     count = int(min(HARMONICS, 0.8 * np.pi * (len(t) - 1) / (guess * total), (len(t) - 4) / 2))
     if count < 1:
-        return float("nan")
+        return Fit(float("nan"), f"no frequency of {len(t)} outputs: too few for what moves this fast")
 
     def residual(unknowns: np.ndarray) -> np.ndarray:
         phases = np.exp(unknowns[1] * t / total) * np.exp(1j * unknowns[0] * np.outer(range(1, count + 1), t))
@@ -164,7 +187,12 @@ def oscillation(times: np.ndarray, values: np.ndarray) -> float:
     fit = least_squares(residual, [guess, 0.0], bounds=limits, x_scale=[bin_width, 1.0], xtol=1e-13, ftol=1e-13)
     rate = float(fit.x[0])
     crossings = np.count_nonzero(np.diff(np.sign(values - values.mean())))
-    return rate if rate * total > 0.95 * 2 * np.pi and crossings > 1 else float("nan")
+    periods = rate * total / (2 * np.pi)
+    if not (periods > 0.95 and crossings > 1):
+        return Fit(float("nan"), f"no frequency: no whole period within {total:.4g}")
+    left = float(np.std(fit.fun) / np.std(values))
+    poor = "; hardly an oscillation" if left > POOR_OSCILLATION else ""
+    return Fit(rate, f"an oscillation, {periods:.2g} periods, the fit leaves {100 * left:.2g} % (rms){poor}")
 
 
 def _spectral_peak(t: np.ndarray, values: np.ndarray) -> float:

@@ -68,7 +68,7 @@ class Loop:
             values = self._observed.record(snapshot)
             if path is not None:
                 meanings = {
-                    name: Meaning(observable.dimension, observable.description)
+                    self._observed.recorded(name): Meaning(observable.dimension, observable.description)
                     for name, observable in self._observed.observables.items()
                 }
                 self._recorder = Recorder.create(

@@ -1,4 +1,4 @@
-"""The result of a run: its observables, and how it ended."""
+"""The result of a run."""
 
 from __future__ import annotations
 
@@ -45,8 +45,14 @@ class Result:
         return self.observers.times
 
     def series(self, name: str) -> np.ndarray:
-        """Return an observable's values (T,) or (T, 3)."""
-        return self.observers.series(name)
+        """The values (T,) or (T, 3) of a series; of a drift U that is U.position, and U a number in ``summaries``.
+
+        Raises KeyError, with a sentence, for a name that has no series.
+        """
+        known = {self.observers.recorded(own): own for own in self.observers.observables}
+        if name not in known:
+            raise KeyError(f"{name} has no series; there are {', '.join(known) or 'none'}")
+        return self.observers.series(known[name])
 
     @property
     def summaries(self) -> dict[str, Summary]:

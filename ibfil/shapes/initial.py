@@ -22,9 +22,12 @@ if TYPE_CHECKING:
 
 
 _MOST_TURN = 0.5  # of e1 from node to node, of a closed rod
+Settle = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # r, e1 of a curve -> of nodes at rest
 
 
-def initial_shape(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:
+def initial_shape(
+    filament: Filament, key: str = "filament", folder: str | Path = ".", settle: Settle | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Positions r (N, 3), in the case's length, and unit directors e1 (N, 3) at t = 0, in the lab frame.
 
     The shape's own curve and frame are placed (placing.py), then e1 is turned about e3 by the
@@ -36,7 +39,8 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
     Kinds, in their own frame (O1, O2, O3):
 
     * straight: (0, 0, 0).
-    * relaxed: (kappa1, kappa2, tau0) at t = 0, so the rod starts without moment.
+    * relaxed: (kappa1, kappa2, tau0) at t = 0, so the rod starts without moment; ``settle`` makes its nodes rest, and
+      those of a helix or circle that has the preferred strains.
     * helix: (k, 0, t), the frame of the relaxed rod with curvature [k, 0] and twist_rate t: e1 is the
       binormal, -e2 points to the axis. k = R/(R^2 + p^2), t = p/(R^2 + p^2), p = pitch/2 pi; t < 0 for a
       left hand.
@@ -51,6 +55,9 @@ def initial_shape(filament: Filament, key: str = "filament", folder: str | Path 
     """
     s = node_arclength(filament, key)
     curve = _placed(filament, s, key, Path(folder))
+    if settle is not None and not filament.closed and at_rest(filament):
+        r, e1 = settle(curve.r, curve.e1)
+        curve = curve._replace(r=r, e1=e1)
     e1 = _turned(curve, filament.shape.twist, s, f"{key}.shape.twist")
     r = curve.r
     if any(p.constant != 0.0 for p in filament.shape.perturb):
@@ -82,6 +89,19 @@ def _closed(r: np.ndarray, e1: np.ndarray, filament: Filament, key: str) -> tupl
         found = f"{key.removesuffix('.shape')}.linking: found a turn by {step:.2g} from node to node"
         raise CaseError([f"{found}; allowed: at most {_MOST_TURN:g}: more nodes, or less twist"])
     return r, e1
+
+
+def at_rest(filament: Filament) -> bool:
+    """Whether the curve of the start shape has the preferred strains at t = 0, and is not straight."""
+    shape = filament.shape
+    wanted = [e.constant for e in (*filament.curvature, filament.twist_rate)]
+    if isinstance(shape, Relaxed):
+        return any(value != 0.0 for value in wanted)
+    strains = _helix_strains(shape) if isinstance(shape, Helix) else np.zeros(3)
+    if isinstance(shape, Circle):
+        strains = np.array([shape.curvature, 0.0, 0.0])
+    known = None not in wanted and bool(np.any(strains))
+    return known and bool(np.allclose(np.array(wanted, float), strains, rtol=1e-9, atol=0.0))
 
 
 def end_tangents(filament: Filament, key: str = "filament", folder: str | Path = ".") -> tuple[np.ndarray, np.ndarray]:

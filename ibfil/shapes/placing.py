@@ -15,15 +15,34 @@ if TYPE_CHECKING:
 
 
 def place(curve: Curve, s: np.ndarray, filament: Filament, key: str) -> Curve:
-    """Turn and move ``curve`` to the ``direction``, ``normal`` and ``position`` of the filament.
+    """Turn ``curve`` to the ``direction`` and ``normal`` of the filament and move it to its ``position``.
 
     align = "tangent": e3 at s = 0. "chord": from the first node to the last. "axis": the helix axis where
     the curve has one, else the mean tangent, which is the chord. "auto": axis for kinds helix and
     relaxed, else tangent. The turn about ``direction`` brings e1(0), projected normal to it, to
     ``normal``, projected likewise. anchor = "start", "middle" (s = L/2) or "centroid": of the nodes ``s``
-    (N,), each with its control volume. ``key`` begins each message. Raises CaseError where the curve or
-    the case does not tell the turn.
+    (N,), each with its control volume.
+
+    A curve whose points are given in the lab frame (``in_place``) is moved only where position or anchor is given, and
+    turned, about its anchor, only where direction or align is; e1 is turned about e3 to ``normal`` only where that is.
+    ``key`` begins each message. Raises CaseError where the curve or the case does not tell the turn.
     """
+    turn = _turn(curve, s, filament, key) if filament.turned else np.eye(3)
+    anchor = _ANCHORS[filament.anchor](curve, s)
+    there = np.asarray(filament.position, float) if filament.moved else anchor
+    shift = there - turn @ anchor if filament.moved or filament.turned else np.zeros(3)
+    e1 = curve.e1 if filament.turned or filament.own_normal else _about_e3(curve, filament, key)
+    return Curve(
+        curve.r @ turn.T + shift,
+        curve.slope @ turn.T,
+        e1 @ turn.T,
+        turn @ curve.middle + shift,
+        None if curve.axis is None else turn @ curve.axis,
+    )
+
+
+def _turn(curve: Curve, s: np.ndarray, filament: Filament, key: str) -> np.ndarray:
+    """The rotation (3, 3) that brings the curve to direction and normal."""
     align = filament.aligned
     own = _basis(_POINTERS[align](curve, s, key), curve.e1[0])
     if own is None:
@@ -33,15 +52,17 @@ def place(curve: Curve, s: np.ndarray, filament: Filament, key: str) -> Curve:
     target = _basis(unit(np.asarray(filament.direction, float)), np.asarray(filament.normal, float))
     if target is None:
         raise CaseError([f"{key}.normal: parallel to direction; e1 cannot point there"])
-    turn = target @ own.T
-    shift = np.asarray(filament.position, float) - turn @ _ANCHORS[filament.anchor](curve, s)
-    return Curve(
-        curve.r @ turn.T + shift,
-        curve.slope @ turn.T,
-        curve.e1 @ turn.T,
-        turn @ curve.middle + shift,
-        None if curve.axis is None else turn @ curve.axis,
-    )
+    return np.asarray(target @ own.T)
+
+
+def _about_e3(curve: Curve, filament: Filament, key: str) -> np.ndarray:
+    """The directors (N, 3), all turned about their tangents by the angle that brings the first to ``normal``."""
+    e3 = unit(curve.slope)
+    target = _basis(e3[0], np.asarray(filament.normal, float))
+    if target is None:
+        raise CaseError([f"{key}.normal: parallel to the curve at s = 0; e1 cannot point there"])
+    e2 = np.cross(e3, curve.e1)
+    return np.asarray((target[:, 0] @ curve.e1[0]) * curve.e1 + (target[:, 0] @ e2[0]) * e2)
 
 
 # --- the unit vector (3,) of a curve that is to point along ``direction``

@@ -42,9 +42,9 @@ class GrowthWatch:
         self._fluid = model.fluid_model.local_fluid(model.rods)
         filaments = model.case.filaments.values()
         self._slowest = timescales.slowest_bending(model)
-        drag = {id(f): model.fluid_model.drag(f) for f in filaments}
+        across = {id(f): model.fluid_model.drag(f) for f in filaments}
         stiffness = {id(f): float(np.min(f.stretching.bind("s")(np.linspace(0, f.length, 11)))) for f in filaments}
-        self._tension_time = max(drag[id(f)] * f.length**2 / stiffness[id(f)] for f in filaments)
+        self._tension_time = max(across[id(f)] * f.length**2 / stiffness[id(f)] for f in filaments)
         self._least = min(timescales.softest(f) / f.length**2 for f in filaments)
         self.mode: Mode | None = None
         self.rate = 0.0

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import CaseError, RunFailed
-from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
 from ..rods.rates import Accepted
 from ..timestepping.base import FAILURES, State, Step
+from ..timestepping.semi_implicit import SemiImplicit
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import Verdict
 from . import failures, steps, timescales
@@ -299,24 +299,29 @@ class Simulation:
     # -- what is looked at ---------------------------------------------------------------------------------------
 
     def _motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Velocity, force on the fluid and reaction (n, m): of the last step, or of the start."""
+        """Velocity, force on the fluid and reaction (n, m): of the step that led here, at the start of the first."""
         if self._last is None:
-            force, _ = self.system.forces(self.state_now.configuration, self.time)
-            small, dt = 1e-6 * self.case.time.end / 1000, self.step_length
+            dt = min(self.step_length, self.longest_step())
             if self.model.mass is not None and not self.case.fluid.inertial:
                 dt *= 1e-3  # a rod with mass has the velocity that it starts with
-            index, value = self.system.held(self.time, self.time + small)
-            # Over a whole step at the speeds of this moment: a fluid with inertia resists a sudden start without limit.
-            held = Prescribed(index, value * (dt / small))
-            response = self.fluid.response(
-                self.state_now.configuration.r, self.state_now.configuration.e3, self.time, dt
-            )
-            answer = response.forced(force, held, np.zeros_like(force))
-            self._last = (answer.move / dt, answer.force, answer.reaction)
+            stepper = self.model.stepper if self.model.noise is None else SemiImplicit()
+            try:
+                step = stepper.step(self.system, self.fluid, self.state_now, dt)
+                self._last = step.velocity, step.force, step.reaction
+            except FAILURES:
+                self._last = self._pushed(dt)
         return self._last
 
+    def _pushed(self, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same, of the forces of this moment alone, over a time dt."""
+        force, _ = self.system.forces(self.state_now.configuration, self.time)
+        held = self.system.held(self.time, self.time + dt)
+        now = self.state_now.configuration
+        answer = self.fluid.response(now.r, now.e3, self.time, dt).forced(force, held, np.zeros_like(force))
+        return answer.move / dt, answer.force, answer.reaction
+
     def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
-        """All filaments now, with diagnostics; velocity and force are those of the step that led here."""
+        """All filaments now, with diagnostics; velocities and forces are those of the step here, or of the first."""
         with self._alone():
             now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened)
             return self._diagnostics.snapshot(now, fields)

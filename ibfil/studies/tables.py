@@ -46,12 +46,10 @@ def observed(run: RunFile) -> dict[str, np.ndarray]:
     """The number () or vector (3,) of each observable of a run."""
     import numpy as np
 
-    from ..observables.factory import observers
-    from ..observables.observers import summaries
+    from ..observables.factory import numbers_of
 
-    observables = observers(run.case).observables
-    series = {name: np.asarray(run.observables[name]) for name in observables}
-    return {name: np.asarray(one.value, float) for name, one in summaries(observables, run.time, series).items()}
+    found = numbers_of(run.case, run.time, run.observables)
+    return {name: np.asarray(one.value, float) for name, one in found.items()}
 
 
 def numbers(run: RunFile) -> dict[str, float]:

@@ -255,9 +255,10 @@ def _meaning(run: RunFile, name: str) -> str:
     words = run.description(f"observables/{name}").split(",")[0]
     for filament in run.filaments:
         words = words.removesuffix(f" of {filament}")
-    observe = run.case.observe.get(name)
+    known = run.case.observe.items()
+    own, observe = next(((own, one) for own, one in known if one.recorded(own) == name), (name, None))
     fit = f" ({observe.kind})" if observe is not None and KINDS[observe.kind].number else ""
-    return textwrap.shorten(f"{name}{fit}: {words}", 60, placeholder=" ...")
+    return textwrap.shorten(f"{own}{fit}: {words}", 60, placeholder=" ...")
 
 
 def _against_time(axes: Axes, run: RunFile, title: str, units: str, lines: dict[str, np.ndarray]) -> None:

@@ -94,7 +94,7 @@ def _onset(runs: Runs) -> list[Row]:
         gamma = run.case.parameters["gamma"]
         middle, first = (run.position()[:, node, 1] for node in (run.case.filaments["rod"].nodes // 2, 0))
         late = run.time * gamma > 2
-        points.append((mu, time_series.growth(run.time[late], np.abs(middle - first)[late]) / gamma))
+        points.append((mu, time_series.growth(run.time[late], np.abs(middle - first)[late]).value / gamma))
     mu, rate = np.array(points).T
     zero = min(np.roots(np.polyfit(mu, rate, 2)), key=lambda root: abs(root - mu.mean())).real
     seconds = runs.seconds("fig7-onset")

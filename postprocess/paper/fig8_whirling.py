@@ -124,12 +124,13 @@ def _fit(run: RunFile) -> tuple[float, float]:
     inside = run.time >= 10
     tip = run.position()[inside, -1, 1:]
     times = run.time[inside]
-    return time_series.growth(times, _amplitude(run)[inside]) * ZETA, abs(time_series.angular_rate(times, tip)) * ZETA
+    rate, turning = time_series.growth(times, _amplitude(run)[inside]), time_series.angular_rate(times, tip)
+    return rate.value * ZETA, abs(turning.value) * ZETA
 
 
 def _rate(run: RunFile) -> float:
     late = run.time > 0.8 * run.time[-1]
-    return time_series.angular_rate(run.time[late], run.position()[late, -1, 1:])
+    return time_series.angular_rate(run.time[late], run.position()[late, -1, 1:]).value
 
 
 def _onset_points(runs: Runs, ratio: float, radius: float) -> np.ndarray:

@@ -80,8 +80,8 @@ def _growth(run) -> tuple[float, float]:
     times, z = run.time, run.position()[:, -1, 2]
     inside = (times >= 2) & (times <= 8)
     seen = np.column_stack([z[inside], np.zeros(inside.sum())])
-    growth = time_series.growth(times[inside], np.abs(z[inside]))
-    return growth * ZETA, time_series.angular_rate(times[inside], seen) * ZETA
+    growth = time_series.growth(times[inside], np.abs(z[inside])).value
+    return growth * ZETA, time_series.angular_rate(times[inside], seen).value * ZETA
 
 
 def _onset(runs: Runs) -> list[Row]:
@@ -112,7 +112,7 @@ def _rate(run) -> float:
     """Frequency of the tip in the last quarter of the run."""
     times, tip = run.time, run.position()[:, -1, 1:]
     late = times > 0.75 * times[-1]
-    return abs(time_series.angular_rate(times[late], tip[late]))
+    return abs(time_series.angular_rate(times[late], tip[late]).value)
 
 
 def _states(runs: Runs) -> list[Row]:

@@ -99,7 +99,8 @@ def test_csv_has_every_value_to_the_last_bit(run, tmp_path):
     with (tmp_path / "made.csv").open(newline="") as file:
         names, *rows = csv.reader(file)
     table = np.array(rows, float)
-    assert names == ["time (s)", "speed (um)", "tip_x (um)", "tip_y (um)", "tip_z (um)"]
+    # A drift is one number of the run: what is kept at each output is the position that it is of.
+    assert names == ["time (s)", "speed.position (um)", "tip_x (um)", "tip_y (um)", "tip_z (um)"]
     np.testing.assert_array_equal(table[:, 0], run.time)
     for i, axis in enumerate("xyz"):
         tip = np.asarray(run.observables["tip"])[:, i]

@@ -206,6 +206,8 @@ COMBINATIONS = [
     ([*STOKES, "fluid.rotation=local"], "fluid.rotation", "has twisting"),
     ([*STOKES, "fluid.rotation=grid"], "fluid.rotation", "has twisting"),
     (["fluid.drag=slender"], f"{ROD}.radius", "slender"),
+    ([f"{ROD}.radius=0.26"], f"{ROD}.radius", 'below L/4 = 0.25 with drag = "cylinder" (the default)'),
+    (["fluid.drag=cylinder"], f"{ROD}.radius", "cylinder"),
     (["fluid.drag=slender", f"{ROD}.radius=0.31"], f"{ROD}.radius", "below L/(2 sqrt(e)) = 0.303265"),
     ([f"{ROD}.twisting=1"], f"{ROD}.radius", "with twisting"),
     ([f"{ROD}.twisting=1", "fluid.drag={perp=2, par=1}"], f"{ROD}.radius", "with twisting"),

@@ -30,7 +30,7 @@ def found(rod: dict[str, Any], fluid: dict[str, Any], **more: Any) -> dict[str, 
 
 def test_in_resistive_force_theory():
     """The sperm number L (zeta_perp omega/A)^(1/4), with the paper's 4 pi eta."""
-    rft = found(WAVE, {"model": "rft"})
+    rft = found(WAVE, {"model": "rft", "drag": "paper"})
     assert rft["sperm number"] == pytest.approx(2 * (4 * np.pi * VISCOSITY * 4 / 3) ** 0.25, rel=1e-3)
     assert rft["omega dt"] == pytest.approx(4 * 0.02, rel=1e-3)
     assert rft["EA L^2/A"] == pytest.approx(500 * 4 / 3)

@@ -40,11 +40,18 @@ FORCE = "fluid.box: the rods push the fluid with a net force"
         (["fluid.cells=[10, 10, 10]"], "filament.rod: a/L = 0.22: on this grid"),
         (["fluid.slip=0"], ""),
         (["fluid.slip=0", "filament.rod.nodes=65"], "filament.rod: nodes are 0.5 cells apart and fluid.slip = 0"),
+        (["observe.x={kind='speed', filament='rod', over=[0.05, 0.1]}"], ""),
+        (
+            ["observe.x={kind='speed', filament='rod', over=[0.05, 0.2]}"],
+            "observe.x.over: it ends at 0.2, beyond time.end",
+        ),
+        (["observe.x={kind='speed', filament='rod', over=[0.1, 0.2]}"], "observe.x.over: it begins at 0.1, not before"),
         (["output.every=0.2"], "output.every: 0.2 is beyond time.end = 0.1"),
         (["fluid.model=rft", "filament.rod.radius=0.3"], ""),  # a grid's matter
         (["filament.rod.mass=0.1"], ""),  # overdamped
         (["filament.rod.mass=10"], ""),  # omega = 7.1: dt = 0.01 takes 0.2 % of it
         (["filament.rod.mass=10", "time.step=0.05"], "time.step: filament rod oscillates at omega = 7.05"),
+        (["fluid.model=rft", "fluid.drag=paper", "filament.rod.radius=0.3"], ""),  # a grid's matter
         (["fluid.thick=true"], ""),
         (["fluid.thick=true", "filament.rod.radius=0.03"], ""),  # the kernel's is 0.0346
         (["fluid.thick=true", "filament.rod.radius=0.02"], "filament.rod.radius: 0.02 makes the couple of the flow"),
@@ -70,7 +77,7 @@ def test_a_back_pressure_that_is_a_rounding_error_is_zero():
 
 def test_check_says_whether_flows_turn_rods_by_their_thickness():
     """And how: the effective aspect ratio, and the period in a shear, of rods that are straight."""
-    flow = ["fluid.model=rft", "fluid.flow=['y', 0, 0]", "filament.rod.radius=0.05"]
+    flow = ["fluid.model=rft", "fluid.drag=paper", "fluid.flow=['y', 0, 0]", "filament.rod.radius=0.05"]
     thin = report(parse_case(SCENE, "s.toml", flow))
     assert "turns towards a shear, never past it" in thin.split("not modelled:")[1]
     assert "r_e" not in thin

@@ -133,7 +133,7 @@ def make_run(path: Path, until: float = 1.0, status: str = "finished") -> Path:
         now = snapshot(case, 0.25 * i, fields=i % 2 == 0)
         values = seen.record(now)
         if recorder is None:
-            meanings = {k: Meaning(o.dimension, o.description) for k, o in seen.observables.items()}
+            meanings = {seen.recorded(k): Meaning(o.dimension, o.description) for k, o in seen.observables.items()}
             location = GridPlace(ORIGIN, SPACING, 1)
             recorder = Recorder.create(
                 path,

@@ -22,7 +22,7 @@ from ibfil.simulation.simulation import Simulation
 
 # A grid small enough for tests: nodes further apart than cells, so nothing locks (fluids/README.md).
 STOKES: Mapping[str, Any] = {"model": "stokes", "box": [2.0, 2.0, 2.0], "cells": [32, 32, 32], "slip": 0.01}
-RFT: Mapping[str, Any] = {"model": "rft"}
+RFT: Mapping[str, Any] = {"model": "rft", "drag": "paper"}  # 4 pi eta across, 2 pi eta along: round numbers
 # Every unknown at work: bent and twisted in space by strains of its own, and spun at a clamp.
 RIBBON: Mapping[str, Any] = {
     "length": 1.0,

@@ -71,9 +71,28 @@ def test_velocity_and_speed_of_a_turning_rod():
 
     assert value('kind = "velocity"\nat = 1.5', motion, [0]) == pytest.approx(np.array([0, 4.5, 0]), abs=1e-12)
     assert value('kind = "velocity"\nat = "centroid"\nalong = [0, -2, 0]', motion, [0]) == pytest.approx(-3.0)
-    assert value('kind = "speed"', motion, [0]) == pytest.approx(6.0)
+    assert value('kind = "speed"\nat = "finish"', motion, [0]) == pytest.approx(6.0)
     for space, expected in {"mean": 4.5, "max": 6.0, "min": 3.0}.items():
         assert value(f'kind = "speed"\nat = [1.0, 2.0]\nspace = "{space}"', motion, [0]) == pytest.approx(expected)
+
+
+def test_what_is_said_of_a_filament_is_said_of_its_centroid_and_where_is_told():
+    """A tail end of a swimmer beats at 62 where it swims at 2.4."""
+
+    def motion(t):
+        return straight() + np.array([5 * t, 0, 0]), {
+            "velocity": np.array([5.0, 0, 0]) + np.cross([0, 0, 3.0], straight())
+        }
+
+    means = {"position": [1, 0, 0], "velocity": [5, 3, 0], "displacement": [0, 0, 0], "speed": np.hypot(5, 3)}
+    for kind, expected in means.items():
+        assert value(f'kind = "{kind}"', motion, [0.0]) == pytest.approx(np.array(expected), abs=1e-12)
+        _, looking = observing(f'kind = "{kind}"')
+        assert 'at = "centroid"' in looking.observables["o"].words
+        assert 'at = "centroid"' in looking.observables["o"].description
+    assert value('kind = "drift"\nalong = [1, 0, 0]', motion, [0.0, 2.0]) == pytest.approx(5.0)
+    _, looking = observing('kind = "amplitude"')
+    assert 'at = "finish"' in looking.observables["o"].words
 
 
 def test_displacement_is_from_the_first_output():

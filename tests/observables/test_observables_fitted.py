@@ -224,4 +224,36 @@ def test_rate_of_any_ellipse(omega, phase, minor, tilt, sign):
     t = EVEN
     along, across = np.cos(omega * t + phase), sign * minor * np.sin(omega * t + phase)
     xy = np.column_stack([np.cos(tilt) * along - np.sin(tilt) * across, np.sin(tilt) * along + np.cos(tilt) * across])
-    assert time_series.angular_rate(t, xy) == pytest.approx(sign * omega, rel=1e-8)
+    assert time_series.angular_rate(t, xy).value == pytest.approx(sign * omega, rel=1e-8)
+
+
+def test_a_fit_says_how_well_it_fits_and_why_there_is_none() -> None:
+    """Growth and frequency by their own words: what they rest on, what they leave."""
+    t = np.linspace(0.0, 10.0, 101)
+    grows = time_series.growth(t, np.exp(0.3 * t))
+    assert grows.quality.startswith("from 101 outputs over 3 e-foldings, to ")
+    assert "hardly" not in grows.quality
+    wobbles = time_series.growth(t, np.exp(0.03 * t + 0.3 * np.sin(0.5 * t)))
+    assert "hardly exponential" in wobbles.quality
+    assert time_series.growth(t, 0 * t).quality.startswith("no growth of 0 outputs")
+    turns = time_series.angular_rate(t, np.column_stack([np.cos(2 * t), np.sin(2 * t)]))
+    assert turns.quality.startswith("a rotation, 3.2 turns, to ")
+    coarse = t[::14]
+    unsure = time_series.angular_rate(coarse, np.column_stack([np.cos(2 * coarse), np.sin(2 * coarse)]))
+    assert "too far apart" in unsure.quality
+    swings = time_series.angular_rate(t, np.column_stack([np.cos(2 * t), 0 * t]))
+    assert swings.quality.startswith("an oscillation, 3.2 periods, the fit leaves ")
+    noise = np.cos(2 * t) + 1.5 * np.random.default_rng(0).standard_normal(101)
+    assert "hardly an oscillation" in time_series.angular_rate(t, np.column_stack([noise, 0 * t])).quality
+    assert time_series.angular_rate(t, np.column_stack([t, 0 * t])).quality.startswith("no frequency")
+    assert time_series.angular_rate(t, np.zeros((101, 2))).quality == "no frequency: nothing moves"
+    assert time_series.angular_rate(t[:3], np.zeros((3, 2))).quality == "no frequency of 3 outputs: it takes four"
+
+
+def test_the_quality_of_a_fit_stands_beside_its_number() -> None:
+    def motion(t):
+        return straight() * [1, 0, 0] + np.outer(S, [0, np.exp(0.3 * t), 0])
+
+    _, found = seen('kind = "growth"', motion, list(np.linspace(0, 5, 11)))
+    assert found.value == pytest.approx(0.3)
+    assert found.quality.startswith("from 11 outputs over 1.5 e-foldings")

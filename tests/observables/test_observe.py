@@ -23,7 +23,7 @@ def test_summaries_over_a_window():
     times = np.concatenate([np.arange(0, 4, 0.5), np.arange(4, 9.0)])  # twice as many outputs on the way up
 
     def summary(word, over):
-        keys = f'kind = "position"\nalong = [1, 0, 0]\nsummary = "{word}"\nover = {over}'
+        keys = f'kind = "position"\nat = "finish"\nalong = [1, 0, 0]\nsummary = "{word}"\nover = {over}'
         return value(keys, motion, times)
 
     assert summary("last", "[1, 7]") == pytest.approx(1.0)
@@ -41,12 +41,12 @@ def test_summaries_of_vectors_are_of_each_component():
         return tip_at(t, -t, t**2)
 
     for word, expected in {"max": (2, 0, 4), "min": (0, -2, 0), "median": (1, -1, 1), "mean": (1, -1, 1.5)}.items():
-        found = value(f'kind = "position"\nsummary = "{word}"', motion, [0.0, 1.0, 2.0])
+        found = value(f'kind = "position"\nat = "finish"\nsummary = "{word}"', motion, [0.0, 1.0, 2.0])
         assert found == pytest.approx(np.array(expected), abs=1e-12)
 
 
 def test_a_window_that_the_run_did_not_finish_is_noted():
-    keys = 'kind = "position"\nalong = [1, 0, 0]\nover = [2, 8]'
+    keys = 'kind = "position"\nat = "finish"\nalong = [1, 0, 0]\nover = [2, 8]'
     _, summary = seen(keys, lambda t: tip_at(t, 0, 0), [0.0, 1.0, 2.0, 3.0])
     assert summary == Summary(3.0, "the run ended at 3, within `over` = [2, 8]")
     _, summary = seen(keys, lambda t: tip_at(t, 0, 0), [0.0, 1.0])
@@ -55,7 +55,7 @@ def test_a_window_that_the_run_did_not_finish_is_noted():
 
 
 def test_times_that_differ_by_rounding_are_in_the_window():
-    keys = 'kind = "position"\nalong = [1, 0, 0]\nsummary = "max"\nover = [0, "3*0.1"]'
+    keys = 'kind = "position"\nat = "finish"\nalong = [1, 0, 0]\nsummary = "max"\nover = [0, "3*0.1"]'
     assert value(keys, lambda t: tip_at(t, 0, 0), [0.0, 0.3, 0.6]) == 0.3  # 3*0.1 is more than 0.3
 
 

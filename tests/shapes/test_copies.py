@@ -30,7 +30,7 @@ end = 0.01
 every = 0.005
 {more}
 """
-TIP = '[observe.tip]\nkind = "position"\nfilament = "{name}"'
+TIP = '[observe.tip]\nkind = "position"\nfilament = "{name}"\nat = "finish"'
 PLACES = [[-1.0, 0.0, 0.0], [0.5, 0.25, 0.0], [2.0, 0.0, -0.5]]
 ROWS = "".join(", ".join(map(str, row)) + "\n" for row in PLACES)
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from helpers.shape_scene import ARC, SPATIAL, X, Z, fault, rod
+from helpers.shape_scene import ARC, KEY, SPATIAL, X, Y, Z, fault, rod
 
+from ibfil.errors import CaseError
 from ibfil.shapes.initial import end_tangents, initial_shape
 
 
@@ -70,6 +73,59 @@ def test_an_upright_filament_has_a_normal_and_is_that_along_x_turned() -> None:
     assert np.ptp(lying[:, 1]) > 0.5
     down, _ = initial_shape(rod(direction=[0, 0, -1], **keys))
     np.testing.assert_allclose(down[:, 1], 0.0, atol=1e-12)
+
+
+BOW = {"kind": "expression", "r": ["3 + s*cos(0.4)", "5 + s*sin(0.4)", "2"]}
+
+
+def test_given_points_stay_where_they_are(tmp_path: Path) -> None:
+    """They were centred on the origin and turned along x, and the places of filaments to each other were lost."""
+    r, e1 = initial_shape(rod(shape=BOW))
+    s = np.linspace(0.0, 1.0, 41)
+    given = np.stack((3 + s * np.cos(0.4), 5 + s * np.sin(0.4), 2 + 0 * s), axis=1)
+    assert np.array_equal(r, given)
+    assert np.all(e1 == Z)
+    np.savetxt(tmp_path / "a.csv", given, delimiter=",", fmt="%.17g")
+    r, e1 = initial_shape(rod(shape={"kind": "file", "path": "a.csv"}), KEY, tmp_path)
+    assert np.array_equal(r, given)
+    assert np.all(e1 == Z)
+
+
+def test_given_points_are_moved_where_a_place_is_given_and_turned_where_a_direction_is() -> None:
+    given, _ = initial_shape(rod(shape=BOW))
+    moved, _ = initial_shape(rod(shape=BOW, position=[1, 0, 0], anchor="start"))
+    np.testing.assert_allclose(moved, given - given[0] + X, atol=1e-14)
+    turned, e1 = initial_shape(rod(shape=BOW, direction=[0, 1, 0]))
+    np.testing.assert_allclose(turned, given[20] + np.outer(np.linspace(-0.5, 0.5, 41), Y), atol=1e-9)
+    assert np.all(e1 == Z)
+    both, _ = initial_shape(rod(shape=BOW, direction=[0, 1, 0], position=[0, 0, 0]))
+    np.testing.assert_allclose(both, np.outer(np.linspace(-0.5, 0.5, 41), Y), atol=1e-9)
+
+
+def test_given_points_have_the_normal_that_is_given_or_that_of_the_file(tmp_path: Path) -> None:
+    normal = np.array([1.0, 0.0, 1.0])
+    r, e1 = initial_shape(rod(shape=BOW, normal=normal.tolist()))
+    tangent = np.array([np.cos(0.4), np.sin(0.4), 0.0])
+    across = normal - (normal @ tangent) * tangent
+    np.testing.assert_allclose(e1, np.tile(across / np.linalg.norm(across), (41, 1)), atol=1e-9)
+    np.savetxt(tmp_path / "a.csv", np.hstack((r, e1)), delimiter=",", fmt="%.17g")
+    file = {"kind": "file", "path": "a.csv"}
+    np.testing.assert_allclose(initial_shape(rod(shape=file), KEY, tmp_path)[1], e1, atol=1e-12)
+    np.testing.assert_allclose(initial_shape(rod(shape=file, normal=[0, 0, 1]), KEY, tmp_path)[1], [Z] * 41, atol=1e-9)
+    upright = rod(shape={"kind": "expression", "r": [0, 0, "s"]})
+    assert np.all(initial_shape(upright)[1] == X)
+    along = rod(shape={"kind": "expression", "r": ["s", 0, 0]}, normal=[0, 1, 0]).model_copy(
+        update={"normal": (1.0, 0.0, 0.0)}
+    )
+    assert fault(along).startswith("filament.rod.normal: parallel to the curve at s = 0")
+
+
+def test_the_plane_of_given_points_is_theirs() -> None:
+    """A rod without twisting, bent by kappa2 in the x-z plane that its points lie in, may be pushed within it alone."""
+    keys = {"curvature": [0, 2], "normal": [1, 0, 0], "shape": {"kind": "expression", "r": [0, 0, "s"]}}
+    rod(**keys, loads={"weight": [1, 0, -1]})
+    with pytest.raises(CaseError, match=r"loads\.weight: found what leads out of the plane"):
+        rod(**keys, loads={"weight": [0, 1, 0]})
 
 
 def test_what_cannot_be_placed_is_refused_in_one_line() -> None:

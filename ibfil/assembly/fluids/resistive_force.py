@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import costs
 from ..drag import drag, drag_coefficients, matching
+from ..profiles import alone
 from .base import FluidModel, Term
 
 if TYPE_CHECKING:
@@ -52,8 +53,12 @@ class ResistiveForceModel(FluidModel):
 
     def drag(self, filament: Filament) -> float:
         """The case's own, across."""
-        radius = None if filament.radius is None else np.atleast_1d(filament.radius.bind("s", "t")(0.0, 0.0))
-        return drag_coefficients(self.case, filament, radius)[0]
+        return self._coefficients(filament)[0]
+
+    def _coefficients(self, filament: Filament) -> tuple[float, float]:
+        """Drag per length across and along a filament."""
+        radius, s = filament.radius, np.linspace(0.0, filament.length, filament.nodes)
+        return drag_coefficients(self.case, filament, None if radius is None else alone(radius, s))[:2]
 
     def turning_drag(self, rods: RodStack, where: slice) -> float:
         """The sum of zeta_perp Lc s^2, s from the middle of the drag."""
@@ -66,11 +71,21 @@ class ResistiveForceModel(FluidModel):
 
     def modelled(self) -> list[str]:
         """Drag, and where its coefficients come from."""
+        fluid, eta = self.case.fluid, self.case.fluid.viscosity
         out = ["resistive-force drag on each node; no flow between nodes"]
-        calibrated = self.case.fluid.calibrated
-        if calibrated is not None:
-            where = "in free space" if self.case.fluid.free else "in the case's periodic box"
-            out.append(f"its coefficients those of a straight rod of length {calibrated.matched:g} {where}")
+        if fluid.calibrated is not None:
+            where = "in free space" if fluid.free else "in the case's periodic box"
+            out.append(f"its coefficients those of a straight rod of length {fluid.calibrated.matched:g} {where}")
+            return out
+        for name, filament in self.case.filaments.items():
+            (perp, par), drag = self._coefficients(filament), fluid.drag_of(filament.radius)
+            which = f'drag = "{drag}"' if isinstance(drag, str) else "given"
+            idle = drag == "paper" and filament.radius is not None
+            unused = ", which does not use the radius" if idle else ""
+            spins = " but for its spin" if idle and filament.twisting is not None else ""
+            out.append(
+                f"drag of {name}: {perp / eta:.4g} eta across, {par / eta:.4g} eta along ({which}{unused}{spins})"
+            )
         return out
 
     def absent(self) -> list[str]:
@@ -85,7 +100,13 @@ class ResistiveForceModel(FluidModel):
             middle = filament.radius.bind("s", "t")(0.5 * filament.length, 0.0)
             out["a/L"] = float(np.max(middle)) / filament.length
         matched = matching(self.case, filament)
-        if matched is not None:
+        if matched is None:
+            perp, par = self._coefficients(filament)
+            out["zeta_perp/eta"], out["zeta_par/eta"] = (
+                perp / self.case.fluid.viscosity,
+                par / self.case.fluid.viscosity,
+            )
+        else:
             out["matched zeta_perp/eta"], out["matched zeta_par/eta"] = matched.perp, matched.par
             out["zeta_perp/zeta_par"], out["matched scatter"] = matched.ratio, matched.scatter
             if matched.spin:

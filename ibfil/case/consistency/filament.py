@@ -117,7 +117,7 @@ def _place(key: str, filament: Filament) -> Iterator[Fault]:
         if not any(getattr(filament, name)):
             yield Fault(f"{key}.{name}", shown(getattr(filament, name)), "a vector that is not zero")
             return
-    if _parallel(filament.direction, filament.normal):
+    if filament.turned and _parallel(filament.direction, filament.normal):
         found = f"{shown(filament.normal)}, parallel to direction"
         yield Fault(f"{key}.normal", found, "a vector at an angle to direction", (f"{key}.direction",))
     copies = filament.copies

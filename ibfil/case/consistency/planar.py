@@ -15,7 +15,7 @@ from ..faults import Fault
 from ..filament import End, Filament, Loads
 from ..fluid import Fluid
 from ..schema import Scene
-from ..shape import Circle, Helix
+from ..shape import Circle, ExpressionShape, Helix
 
 Vector = tuple[float, float, float]
 Components = Sequence[Expression] | Sequence[float]
@@ -139,9 +139,22 @@ def _unit(a: Vector) -> Vector | None:
 
 def _directors(filament: Filament) -> tuple[Vector, Vector, Vector] | None:
     """e1, e2, e3 where the filament stands; None where direction and normal do not give them."""
-    e3 = _unit(filament.direction)
-    e2 = _unit(_cross(e3, filament.normal)) if e3 else None
+    e3 = _unit(_begins(filament))
+    upright = filament.own_normal and e3 is not None and math.hypot(*e3[:2]) < 1e-9
+    e2 = _unit(_cross(e3, (1.0, 0.0, 0.0) if upright else filament.normal)) if e3 else None
     return (_cross(e2, e3), e2, e3) if e2 and e3 else None
+
+
+def _begins(filament: Filament) -> Vector:
+    """Along the tangent at s = 0, as far as a case tells it: points of a file that are not turned are not read here."""
+    shape, small = filament.shape, 1e-6 * filament.length
+    if filament.turned or not isinstance(shape, ExpressionShape):
+        return filament.direction
+    try:
+        x, y, z = (part.at(s=small) - part.at(s=0.0) for part in shape.r)
+        return x, y, z
+    except ExpressionError:
+        return filament.direction
 
 
 def _across(normal: Vector) -> list[Vector]:

@@ -9,22 +9,21 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from ..expressions import ExpressionError, suggestion
+from ..expressions import ExpressionError
 from ..faults import Fault, shown
-from ..filament import copy_name, single
 from ..fluid import Coefficients, Fluid, Matched
-from ..schema import Observe, Scene
+from ..schema import Scene
 from .closed import check_closed
 from .filament import check_filament
 from .links import check_links
+from .observed import check_observed
 from .sheet import check_sheet
 from .size import check_size
 from .space import check_space
 from .thickness import check_thickness
 
+THINNEST = {"slender": (0.5 * math.exp(-0.5), "L/(2 sqrt(e))"), "cylinder": (0.25, "L/4")}  # of the length: the radius
 LONGEST = 500  # segments of the straight rod that drag is matched to: more would be a long wait
-# Three numbers where `along` is absent.
-VECTORS = ("position", "velocity", "displacement", "drift", "force", "torque")
 
 
 def check(case: Scene) -> Iterator[Fault]:
@@ -46,9 +45,7 @@ def check(case: Scene) -> Iterator[Fault]:
         _thermal,
         _time,
         _output,
-        _observe,
-        _stops,
-        _expect,
+        check_observed,
     ):
         yield from part(case)
 
@@ -116,22 +113,25 @@ def _jump(fluid: Fluid) -> float:
 
 
 def _drag(case: Scene) -> Iterator[Fault]:
-    """The drag needs a radius where it is made of it, and a slender rod one that is slender."""
+    """The drag needs a radius where it is made of it, and a thin rod one that is thin."""
     fluid = case.fluid
     spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None
     for name, filament in case.filaments.items():
         key = f"filament.{name}.radius"
         reads = (f"filament.{name}.twisting", f"filament.{name}.length", "fluid.drag", "fluid.model")
-        slender = fluid.model == "rft" and fluid.drag == "slender"
+        drag = fluid.drag_of(filament.radius) if fluid.model == "rft" else ""
+        of_radius = drag if isinstance(drag, str) and drag in THINNEST else ""
         if filament.radius is None:
-            if slender:
-                yield Fault(key, "nothing", 'a radius: drag = "slender" is made of it', reads)
+            if of_radius:
+                yield Fault(key, "nothing", f'a radius: drag = "{drag}" is made of it', reads)
             elif filament.twisting is not None and not spin:
                 yield Fault(key, "nothing", "with twisting, a radius (or fluid.drag with spin)", reads)
-        elif slender and filament.radius.constant is not None:
-            most = 0.5 * filament.length * math.exp(-0.5)
+        elif of_radius and filament.radius.constant is not None:
+            share, words = THINNEST[of_radius]
+            most = share * filament.length
             if filament.radius.constant >= most:
-                allowed = f'below L/(2 sqrt(e)) = {most:.6g} with drag = "slender"'
+                chosen = f'{drag}" (the default)' if fluid.drag == "auto" else f'{drag}"'
+                allowed = f'below {words} = {most:.6g} with drag = "{chosen}, or drag = {{ perp, par }}'
                 yield Fault(key, f"{filament.radius.constant:.6g}", allowed, reads)
 
 
@@ -207,83 +207,3 @@ def _output(case: Scene) -> Iterator[Fault]:
                     "only with grid_every",
                     ("output.grid_every",),
                 )
-
-
-def _observe(case: Scene) -> Iterator[Fault]:
-    for name, entry in case.observe.items():
-        yield from _observed(f"observe.{name}", entry, case)
-
-
-def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
-    filament = single(case.filaments, entry.filament)
-    if entry.of_link or entry.link:
-        yield from _of_link(key, entry, case)
-    elif filament is None and entry.filament in case.filaments:
-        if not entry.together:
-            found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
-            yield Fault(f"{key}.filament", found, f'a copy by its name, "{name}" being the first', ("filament",))
-    elif filament is None and not (entry.together and not entry.filament):
-        found = shown(entry.filament) + suggestion(entry.filament, case.filaments) if entry.filament else "nothing"
-        yield Fault(f"{key}.filament", found, f"one of {', '.join(case.filaments)}", ("filament",))
-    elif filament is not None and not isinstance(entry.at, str):
-        last = entry.at[1] if isinstance(entry.at, tuple) else entry.at
-        if last > filament.length * (1.0 + 1e-12):
-            reads = (f"{key}.filament", f"filament.{entry.filament}.length")
-            yield Fault(f"{key}.at", f"{last:g}", f"at most length = {filament.length:g}", reads)
-    if entry.over is not None and not 0.0 <= entry.over[0] < entry.over[1]:
-        yield Fault(f"{key}.over", shown(entry.over), "[t1, t2] with 0 <= t1 < t2")
-    if entry.along is not None and not any(entry.along):
-        yield Fault(f"{key}.along", shown(entry.along), "a vector that is not zero")
-    if (entry.kind == "diffusion_ratio") != (entry.interval > 0.0):
-        found = f'{entry.interval:g} with kind = "{entry.kind}"'
-        yield Fault(f"{key}.interval", found, "> 0 with diffusion_ratio, and only there", (f"{key}.kind",))
-
-
-def _of_link(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
-    """A link is named where it is looked at, and only there."""
-    if not entry.of_link:
-        found = f'{shown(entry.link)} with kind = "{entry.kind}"'
-        yield Fault(f"{key}.link", found, "only with kinds that look at a link", (f"{key}.kind",))
-    elif entry.link not in case.links:
-        found = shown(entry.link) + suggestion(entry.link, case.links) if entry.link else "nothing"
-        known = ", ".join(case.links) or "a [link.NAME], of which there is none"
-        yield Fault(f"{key}.link", found, known, ("link",))
-
-
-def _scalar(key: str, name: str, case: Scene) -> Iterator[Fault]:
-    """The faults of ``key`` = ``name`` where a number is wanted of the observable ``name``."""
-    entry = case.observe.get(name)
-    reads = (f"observe.{name}",)
-    if entry is None:
-        known = ", ".join(case.observe) or "an [observe.NAME], of which there is none"
-        yield Fault(key, shown(name) + suggestion(name, case.observe), known, ("observe",))
-    elif entry.kind in VECTORS and entry.along is None:
-        found = f"{shown(name)}, three numbers ({entry.kind})"
-        yield Fault(key, found, f"an observable of one number; give observe.{name}.along", reads)
-
-
-def _stops(case: Scene) -> Iterator[Fault]:
-    for i, stop in enumerate(case.stops):
-        yield from _scalar(f"stop.{i}.observe", stop.observe, case)
-        given = [key for key in ("below", "above", "steady") if getattr(stop, key) is not None]
-        if len(given) != 1:
-            keys = tuple(f"stop.{i}.{key}" for key in ("below", "above", "steady"))
-            yield Fault(f"stop.{i}", " and ".join(given) or "no condition", "one of below, above, steady", keys)
-
-
-def _expect(case: Scene) -> Iterator[Fault]:
-    for name, entry in case.expect.items():
-        key = f"expect.{name}"
-        yield from _scalar(f"{key}.observe", entry.observe, case)
-        if (entry.value is None) == (entry.range is None):
-            found = "nothing" if entry.value is None else "value and range"
-            yield Fault(f"{key}.value", found, "a value, or a range instead", (f"{key}.range",))
-        elif entry.range is not None and not entry.range[0] < entry.range[1]:
-            yield Fault(f"{key}.range", shown(entry.range), "[lo, hi] with lo < hi")
-        reads = (f"{key}.value", f"{key}.range", f"{key}.absolute")
-        if entry.range is not None and (entry.tolerance is not None or entry.absolute is not None):
-            yield Fault(f"{key}.tolerance", "a tolerance with range", "tolerance or absolute only with value", reads)
-        elif entry.tolerance is not None and entry.absolute is not None:
-            yield Fault(f"{key}.tolerance", "tolerance and absolute", "one of them", reads)
-        elif entry.value == 0.0 and entry.absolute is None:
-            yield Fault(f"{key}.tolerance", "a relative tolerance of value = 0", "absolute", reads)

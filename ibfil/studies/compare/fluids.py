@@ -29,7 +29,7 @@ def _slender(case: Case) -> tuple[str, ...]:
 
 
 def _rft(case: Case) -> tuple[str, ...]:
-    return ("fluid.model=rft", "fluid.drag=paper") if case.fluid.drag_matched else ("fluid.model=rft",)
+    return ("fluid.model=rft", "fluid.drag=auto") if case.fluid.drag_matched else ("fluid.model=rft",)
 
 
 def _wall(case: Case) -> tuple[str, ...]:

@@ -119,12 +119,12 @@ def _frequency(times: np.ndarray, tip: np.ndarray, window: Window) -> Quantity |
     _, axes = np.linalg.eigh(away.T @ away)
     flat = path @ axes[:, [2, 1]]
     # About its mean: the path of a tip that is bent to one side as it turns is no circle about the axis.
-    rate = abs(time_series.angular_rate(t, flat - flat.mean(axis=0)))
+    rate = abs(time_series.angular_rate(t, flat - flat.mean(axis=0)).value)
     if not np.isfinite(rate):
         return None
     half = len(t) // 2
     halves = (slice(half), slice(half, None))
-    parts = [abs(time_series.angular_rate(t[cut], flat[cut] - flat[cut].mean(axis=0))) for cut in halves]
+    parts = [abs(time_series.angular_rate(t[cut], flat[cut] - flat[cut].mean(axis=0)).value) for cut in halves]
     error = 0.5 * abs(parts[1] - parts[0]) if np.all(np.isfinite(parts)) else None
     return Quantity(float(rate), error, "rad/time")
 

@@ -1,0 +1,100 @@
+"""Inconsistencies of what is observed of a run: observables, rules that end it, expectations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..expressions import suggestion
+from ..faults import Fault, shown
+from ..filament import copy_name, single
+from ..schema import Observe, Scene
+
+# Three numbers where `along` is absent.
+VECTORS = ("position", "velocity", "displacement", "drift", "force", "torque")
+
+
+def check_observed(case: Scene) -> Iterator[Fault]:
+    """All faults of observables, stop rules and expectations."""
+    yield from _observe(case)
+    yield from _stops(case)
+    yield from _expect(case)
+
+
+def _observe(case: Scene) -> Iterator[Fault]:
+    for name, entry in case.observe.items():
+        yield from _observed(f"observe.{name}", entry, case)
+
+
+def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
+    filament = single(case.filaments, entry.filament)
+    if entry.of_link or entry.link:
+        yield from _of_link(key, entry, case)
+    elif filament is None and entry.filament in case.filaments:
+        if not entry.together:
+            found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
+            yield Fault(f"{key}.filament", found, f'a copy by its name, "{name}" being the first', ("filament",))
+    elif filament is None and not (entry.together and not entry.filament):
+        found = shown(entry.filament) + suggestion(entry.filament, case.filaments) if entry.filament else "nothing"
+        yield Fault(f"{key}.filament", found, f"one of {', '.join(case.filaments)}", ("filament",))
+    elif filament is not None and not isinstance(entry.at, str):
+        last = entry.at[1] if isinstance(entry.at, tuple) else entry.at
+        if last > filament.length * (1.0 + 1e-12):
+            reads = (f"{key}.filament", f"filament.{entry.filament}.length")
+            yield Fault(f"{key}.at", f"{last:g}", f"at most length = {filament.length:g}", reads)
+    if entry.over is not None and not 0.0 <= entry.over[0] < entry.over[1]:
+        yield Fault(f"{key}.over", shown(entry.over), "[t1, t2] with 0 <= t1 < t2")
+    if entry.along is not None and not any(entry.along):
+        yield Fault(f"{key}.along", shown(entry.along), "a vector that is not zero")
+    if (entry.kind == "diffusion_ratio") != (entry.interval > 0.0):
+        found = f'{entry.interval:g} with kind = "{entry.kind}"'
+        yield Fault(f"{key}.interval", found, "> 0 with diffusion_ratio, and only there", (f"{key}.kind",))
+
+
+def _of_link(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
+    """A link is named where it is looked at, and only there."""
+    if not entry.of_link:
+        found = f'{shown(entry.link)} with kind = "{entry.kind}"'
+        yield Fault(f"{key}.link", found, "only with kinds that look at a link", (f"{key}.kind",))
+    elif entry.link not in case.links:
+        found = shown(entry.link) + suggestion(entry.link, case.links) if entry.link else "nothing"
+        known = ", ".join(case.links) or "a [link.NAME], of which there is none"
+        yield Fault(f"{key}.link", found, known, ("link",))
+
+
+def _scalar(key: str, name: str, case: Scene) -> Iterator[Fault]:
+    """The faults of ``key`` = ``name`` where a number is wanted of the observable ``name``."""
+    entry = case.observe.get(name)
+    reads = (f"observe.{name}",)
+    if entry is None:
+        known = ", ".join(case.observe) or "an [observe.NAME], of which there is none"
+        yield Fault(key, shown(name) + suggestion(name, case.observe), known, ("observe",))
+    elif entry.kind in VECTORS and entry.along is None:
+        found = f"{shown(name)}, three numbers ({entry.kind})"
+        yield Fault(key, found, f"an observable of one number; give observe.{name}.along", reads)
+
+
+def _stops(case: Scene) -> Iterator[Fault]:
+    for i, stop in enumerate(case.stops):
+        yield from _scalar(f"stop.{i}.observe", stop.observe, case)
+        given = [key for key in ("below", "above", "steady") if getattr(stop, key) is not None]
+        if len(given) != 1:
+            keys = tuple(f"stop.{i}.{key}" for key in ("below", "above", "steady"))
+            yield Fault(f"stop.{i}", " and ".join(given) or "no condition", "one of below, above, steady", keys)
+
+
+def _expect(case: Scene) -> Iterator[Fault]:
+    for name, entry in case.expect.items():
+        key = f"expect.{name}"
+        yield from _scalar(f"{key}.observe", entry.observe, case)
+        if (entry.value is None) == (entry.range is None):
+            found = "nothing" if entry.value is None else "value and range"
+            yield Fault(f"{key}.value", found, "a value, or a range instead", (f"{key}.range",))
+        elif entry.range is not None and not entry.range[0] < entry.range[1]:
+            yield Fault(f"{key}.range", shown(entry.range), "[lo, hi] with lo < hi")
+        reads = (f"{key}.value", f"{key}.range", f"{key}.absolute")
+        if entry.range is not None and (entry.tolerance is not None or entry.absolute is not None):
+            yield Fault(f"{key}.tolerance", "a tolerance with range", "tolerance or absolute only with value", reads)
+        elif entry.tolerance is not None and entry.absolute is not None:
+            yield Fault(f"{key}.tolerance", "tolerance and absolute", "one of them", reads)
+        elif entry.value == 0.0 and entry.absolute is None:
+            yield Fault(f"{key}.tolerance", "a relative tolerance of value = 0", "absolute", reads)
