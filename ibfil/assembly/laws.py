@@ -45,6 +45,13 @@ def law(
             gradient[where] = filament.law.gradient
     if gradient.any():
         out = constitutive.DomainWalls(out, mesh, gradient, field(filaments, nodes, s, lambda f: f.twist_rate))
+    if any(f.damping for f in filaments):
+        from ..rods.damping import Damped
+
+        time = np.zeros(len(s))
+        for filament, where in zip(filaments, nodes, strict=True):
+            time[where] = filament.damping
+        out = Damped(out, time[:, None] * _bending(filaments, nodes, s), time * _torsion(filaments, nodes, s))
     return out
 
 

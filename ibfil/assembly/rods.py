@@ -161,6 +161,8 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
         forces += joined
     system = _kind(filaments, stacked)(mesh, law, stretching, free, ends, forces, unknowns, length)
     start = system.start(r, e1)
+    for part in system.remembering:
+        part.start(start)
     return RodStack(names, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined))
 
 

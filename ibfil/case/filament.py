@@ -203,6 +203,9 @@ class Filament(Table):
     twisting: OfS | None = Field(None, description="twist modulus C > 0; absent: no twist, planar scenes only")
     stretching: OfS = Field(description="axial stiffness EA > 0, a force (the paper's sigma0)", examples=[1e4])
     radius: OfS | None = Field(None, description="material radius > 0; required with twisting unless drag gives spin")
+    damping: NotNegative = Field(
+        0.0, description="internal damping, a time mu: moments mu A d(curvature)/dt, mu C d(twist)/dt beside the law's"
+    )
     mass: OfS | None = Field(
         None, description="mass per length; navier-stokes: beyond that of the fluid displaced. Absent: no inertia"
     )

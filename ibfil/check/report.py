@@ -57,6 +57,8 @@ def modelled(case: Case) -> list[str]:
         terms = ["bending", "stretching"] + (["twisting"] if f.twisting is not None else [])
         if any(k.constant != 0 for k in (*f.curvature, f.twist_rate)):
             terms.append("preferred strains")
+        if f.damping:
+            terms.append(f"internal damping, {f.damping:g}")
         if f.mass is not None:
             terms.append("mass")
         if not f.law.linear:

@@ -33,6 +33,9 @@ class Remembering:
 
     key: str
 
+    def start(self, configuration: Configuration) -> None:
+        """The rods as they begin, for what does not know them before."""
+
     def begin(self, tau: float, w: float) -> None:
         """A step of effective length tau begins, w = dt/dt_old; zero where it does not look back."""
         raise NotImplementedError

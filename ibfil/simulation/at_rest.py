@@ -120,6 +120,8 @@ def _driven(case: Case) -> Iterator[str]:
             told.add(key)
             yield f"{key}: found a function of t; allowed: constants; rests and modes are of what does not change"
     for name, filament in case.filaments.items():
+        if filament.damping:
+            yield f"filament.{name}.damping: found {filament.damping:g}; allowed: 0; modes do not have it"
         if filament.closed:
             yield f"filament.{name}.closed: found true; allowed: rods with ends; rests and modes are not of closed ones"
     for name, link in case.links.items():

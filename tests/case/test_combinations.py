@@ -114,6 +114,10 @@ COMBINATIONS = [
     ([f"{ROD}.bending=[1, 2]", f"{ROD}.loads.weight=[0, 1, 1]"], f"{ROD}.loads.weight", "A1 != A2"),
     ([f"{ROD}.bending=[1, 2]", "fluid.flow=[0, 'z', 'y']"], "fluid.flow", "A1 != A2"),
     ([f"{ROD}.bending=[1, 2]", *THERMAL], "thermal.directions", "A1 != A2"),
+    # internal damping
+    ([f"{ROD}.damping=1", "time.scheme=explicit"], f"{ROD}.damping", "no rate within a step"),
+    ([f"{ROD}.damping=1", *THERMAL], f"{ROD}.damping", "noise it would need"),
+    ([f"{ROD}.damping=1", f"{ROD}.force=torque-free"], f"{ROD}.damping", "eq44"),
     # closed filaments
     ([f"{ROD}.linking=1"], f"{ROD}.linking", "without closed = true"),
     ([*CLOSED, f"{ROD}.linking=1"], f"{ROD}.linking", "1 without twisting"),

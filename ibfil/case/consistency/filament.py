@@ -27,12 +27,25 @@ def check_filament(name: str, filament: Filament, case: Scene) -> Iterator[Fault
     yield from _moduli(key, filament)
     yield from check_mass(key, filament, case)
     yield from _law(f"{key}.law", filament)
+    yield from _damping(key, filament, case)
     yield from _place(key, filament)
     yield from _shape(key, filament)
     yield from _end(f"{key}.start", filament.start)
     yield from _end(f"{key}.finish", filament.finish)
     if filament.twisting is None:
         yield from check_planar(key, filament, case)
+
+
+def _damping(key: str, filament: Filament, case: Scene) -> Iterator[Fault]:
+    """Schemes and noise that damping does not go with."""
+    found = f"{filament.damping:g} with "
+    if filament.damping and case.time.explicit:
+        explicit = found + 'time.scheme = "explicit", which knows no rate within a step'
+        yield Fault(f"{key}.damping", explicit, '"implicit" or "semi-implicit"', ("time.scheme",))
+    if filament.damping and case.thermal is not None:
+        yield Fault(f"{key}.damping", found + "[thermal], whose noise it would need as well", "0", ("thermal",))
+    if filament.damping and filament.force == "torque-free":
+        yield Fault(f"{key}.damping", found + 'force = "torque-free"', '0, or force = "eq44"', (f"{key}.force",))
 
 
 def _numbers(key: str, filament: Filament) -> Iterator[Fault]:
