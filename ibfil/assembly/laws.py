@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..case.filament import Stiffening, TwoWell
 from ..case.table import ZERO
+from ..errors import CaseError
 from ..rods import constitutive
 from .profiles import alone, along, field, half
 
 if TYPE_CHECKING:
     from ..case.expressions import Expression
     from ..case.filament import Filament
+    from ..case.schema import Case
     from ..rods.base import Law
     from ..rods.mesh import Mesh
 
@@ -53,6 +55,26 @@ def law(
             time[where] = filament.damping
         out = Damped(out, time[:, None] * _bending(filaments, nodes, s), time * _torsion(filaments, nodes, s))
     return out
+
+
+def active(case: Case, law: Law, given: Mapping[str, Any], ranges: Mapping[str, slice], s: np.ndarray) -> Law:
+    """The law with the activities among ``given`` beside it. Raises CaseError where they do not go with the case."""
+    from ..rods.activity import Active, Part
+
+    parts = []
+    for name, activity in given.items():
+        filament = case.filaments[name]
+        wrong = {
+            "copies": filament.copies is not None,
+            'force = "torque-free"': filament.force == "torque-free",
+            'time.scheme = "explicit"': case.time.explicit,
+            "[thermal]": case.thermal is not None,
+        }
+        if hasattr(activity, "active"):
+            for found in (key for key, there in wrong.items() if there):
+                raise CaseError([f"{case.file}: laws: found an activity of {name} with {found}; allowed: without it"])
+            parts.append(Part(name, ranges[name], s[ranges[name]], activity))
+    return Active(law, parts)
 
 
 def _bending(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray) -> np.ndarray:

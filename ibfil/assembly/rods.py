@@ -141,7 +141,9 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     unknowns = 4 if any(f.twisting is not None for f in filaments) else 3
     ends, free = prescribed_ends(filaments, nodes, ranges, unknowns)
     own = [next((law for name, law in given.items() if case.filaments[name] is f), None) for f in filaments]
-    law = laws.law(filaments, ranges, s, mesh, own)
+    law = laws.law(filaments, ranges, s, mesh, [each if hasattr(each, "bending") else None for each in own])
+    if any(hasattr(each, "active") for each in own):
+        law = laws.active(case, law, given, dict(zip([p.name for p in placed], ranges, strict=True)), s)
     stretching = half(along(filaments, ranges, s, lambda f: f.stretching))
     length = min(f.length for f in filaments)
     forces, names = loads(filaments, nodes, s, mesh, positions), tuple(p.name for p in placed)
