@@ -123,5 +123,5 @@ class Active(Remembering):
 
 
 def _part(memory: Mapping[str, np.ndarray | float], start: str) -> dict[str, np.ndarray | float]:
-    """What has names that begin so, by the rest of the names."""
+    """The values whose names begin so, by the rest of the names."""
     return {name.removeprefix(start): value for name, value in memory.items() if name.startswith(start)}
