@@ -3,7 +3,7 @@
     M_a = law + m_a(O, dO/dt),      dM_a/dO_b = .. + dm_a/dO_b + dm_a/d(dO_b/dt)/tau
 
 Rates are the step's own difference (rates.py), so feedback stands within the Newton iteration, of the scheme's order
-and without a limit on the step. What an activity remembers changes when a step is taken, and is part of a run's state.
+and without a limit on the step. Its memory changes when a step is taken, and is part of the state of a run.
 """
 
 from __future__ import annotations
