@@ -10,6 +10,7 @@ from ..errors import CaseError
 from . import linked as bench_linked
 from . import many as bench_many
 from . import pieces
+from . import spaces as bench_spaces
 from . import threads as bench_threads
 from .timing import Row, table
 
@@ -48,6 +49,13 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         pieces.table_pair("peskin4", 1.0),
         pieces.table_pair("bkp6", 4.5),
         pieces.start_up(),
+    ],
+    "spaces": lambda: [
+        *bench_spaces.tables(),
+        *bench_spaces.steps(),
+        bench_spaces.wall_pairs("peskin4", 3.0),
+        bench_spaces.wall_pairs("bkp6", 3.0),
+        *bench_spaces.transforms(),
     ],
     "swimmer": lambda: pieces.swimmers(),
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],

@@ -33,6 +33,11 @@ study whirling_sweep sweep whirling time.end=30 --vary parameters.ratio=8.6,8.8,
 study whirling_trade trade whirling time.end=10 'observe.growth.over=[5,10]' 'observe.whirl.over=[5,10]' filament.rod.nodes=49 \
     --vary time.order=1,2 --vary time.step=0.016,0.008,0.004,0.002 --observe growth,whirl --clock processor
 
+# Four cilia in a row on a wall: what they pump over the phase between neighbours.
+study cilia_phase sweep cilia_row \
+    --vary parameters.phase=-3.1416,-2.3562,-1.9635,-1.5708,-1.1781,-0.7854,-0.3927,0,0.3927,0.7854,1.1781,1.5708,2.3562,3.1416
+python "$here/flux_over_phase.py" "$out/cilia_phase/sweep.csv" "$out/cilia_phase/sweep.png"
+
 # The paper's own grid locks without slip: nodes h/2 apart. Slip, or cells no larger than the nodes are apart, cure it.
 study locking stability swimmer_locked time.end=0.6283 time.step=0.0125664 output.every=0.0628318 \
     --vary fluid.slip=0,1e-4,1e-3,0.01 --vary 'fluid.cells=[48,48,48],[64,64,64],[96,96,96],[128,128,128]'

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ibfil.bench import linked, many, parts, pieces, timing
+from ibfil.bench import linked, many, parts, pieces, spaces, timing
 from ibfil.errors import CaseError
 
 
@@ -20,6 +20,8 @@ from ibfil.errors import CaseError
         lambda: [pieces.inertia(16)],
         lambda: pieces.swimmers(end=1e-3),
         lambda: linked.linked(2, (1e9, None), nodes=8),
+        lambda: [*spaces.tables(), *spaces.steps(11), spaces.wall_pairs("roma3", 3.0, 5)],
+        lambda: spaces.transforms((9, 5, 4), 5),
     ],
 )
 def test_pieces_give_finite_positive_numbers(rows, monkeypatch):
@@ -51,7 +53,7 @@ def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monke
 
 
 def test_a_part_there_is_not_is_refused():
-    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, swimmer"):
+    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, spaces, swimmer"):
         parts.main(parts=["pieces", "nope"])
 
 
