@@ -147,7 +147,9 @@ class Observe(Table):
         "link_slide",
         "link_shear",
     ] = Field(description="what is taken; each is explained at the end of `ibfil schema`", examples=["speed"])
-    filament: str = Field("", description="name of a filament; needed where there are several")
+    filament: str = Field(
+        "", description="name of a filament; where there are several, needed but for dissipation and flux"
+    )
     link: str = Field("", description="name of a link, where the kind looks at one")
     at: Annotated[
         float | tuple[float, float] | Literal["start", "finish", "middle", "centroid"],
