@@ -17,13 +17,14 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError, Interrupted, RunFailed
 from ..screen import tell
 from .member import Member, Outcome
+from .progress import MemberProgress
 from .workers import side_by_side, stop_if_cut
 
 if TYPE_CHECKING:
@@ -49,12 +50,13 @@ def run_members(
 
     ``executor`` is any of concurrent.futures, a cluster's for instance: `work` and its arguments can be pickled,
     and the folder must be the same on all its machines. With one job and no executor they run in this process.
-    ``log`` is told a line when a member ends. A run that failed for reasons of the scene counts as known until
-    its case or the versions change, and is not tried again.
+    ``log`` is told a line when a member ends, with the time left; a terminal has a bar too. A run that failed for
+    reasons of the scene counts as known until its case or the versions change, and is not tried again.
 
     Raises CaseError where two members have one name or one cannot be that of a file, or the folder cannot be
-    made; Interrupted after Ctrl-C or SIGTERM, when the runs under way have written their checkpoints: the same
-    call goes on. A member whose case is at fault, fails or kills its process is an Outcome, no exception.
+    made; Interrupted after Ctrl-C or SIGTERM, when the runs under way have written their checkpoints, and where the
+    executor broke: the same call goes on. A member whose case is at fault, fails or kills its process is an Outcome,
+    no exception.
     """
     folder = Path(folder)
     _check_names(members)
@@ -67,11 +69,10 @@ def run_members(
         if not known.done and known.status != "waiting":
             log(_line(known))
     todo = [member for member in members if outcomes[member.name].status == "waiting"]
-    ended = len(members) - len(todo)
-    for outcome in _run_all(todo, folder, jobs, executor):
-        outcomes[outcome.member.name] = outcome
-        ended += outcome.status != "interrupted"
-        log(f"{_line(outcome)} ({ended} of {len(members)})")
+    with MemberProgress(len(members), len(members) - len(todo)) as progress:
+        for outcome in _run_all(todo, folder, jobs, executor):
+            outcomes[outcome.member.name] = outcome
+            progress.tell(_line(outcome), outcome.status not in ("interrupted", "waiting"), log)
     if any(outcome.status in ("interrupted", "waiting") for outcome in outcomes.values()):
         done = sum(outcome.done for outcome in outcomes.values())
         raise Interrupted(f"interrupted; {done} of {len(members)} runs are done; the same command goes on")
@@ -206,15 +207,20 @@ def _run_all(todo: Sequence[Member], folder: Path, jobs: int, executor: Executor
 def _submitted(executor: Executor, todo: Sequence[Member], folder: Path) -> Iterator[Outcome]:
     """In an executor that was given. After a signal what has not begun is taken back, what has is left to it."""
     from ..running.progress import Signals
+    from .executors import loss
 
-    futures = {executor.submit(work, member, str(folder.resolve())): member for member in todo}
+    futures: dict[Future[Outcome], Member] = {}
     with Signals() as signals:
+        try:
+            for member in todo:
+                futures[executor.submit(work, member, str(folder.resolve()))] = member
+        except Exception as error:  # one that is broken, or whose scheduler has gone; the rest waits
+            yield Outcome(todo[len(futures)], "waiting", folder, f"the executor takes no more: {error}")
         while futures and not signals.caught:
             for future in wait(futures, timeout=_LOOK, return_when=FIRST_COMPLETED).done:
-                member = futures.pop(future)
-                error = future.exception()
+                member, lost = futures.pop(future), loss(future)
                 path = folder / f"{member.name}.h5"
-                yield Outcome(member, "failed", path, f"its process died: {error}") if error else future.result()
+                yield Outcome(member, lost[0], path, lost[1]) if lost else future.result()
     for future in futures:
         future.cancel()
 

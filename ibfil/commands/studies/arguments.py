@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 CASE = "the case, a file or a shipped name, and changes to it that hold for all runs"
 VARY = "what is varied: KEY=V1,V2,..., any number of times; keys that change together: KEY=V1,V2&OTHER=W1,W2"
 
+EXECUTOR = "runs go to the executor of FACTORY(N of --jobs): a cluster's, loky's ... (ibfil/studies/README.md)"
+
 
 def add_study(command: argparse.ArgumentParser, kind: str) -> None:
     """Add the case, the folder and the jobs of a study."""
@@ -24,6 +26,7 @@ def add_study(command: argparse.ArgumentParser, kind: str) -> None:
     command.add_argument("words", nargs="+", metavar="CASE [KEY=VALUE ...]", help=CASE)
     command.add_argument("-o", dest="folder", metavar="DIR", help=f"the folder (default: the case's name -{kind})")
     command.add_argument("--jobs", type=count, default=1, metavar="N", help="runs side by side, one thread each")
+    command.add_argument("--executor", metavar="MODULE:FACTORY", help=EXECUTOR)
 
 
 def add_vary(command: argparse.ArgumentParser) -> None:

@@ -29,17 +29,20 @@ def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     case, changes, folder = begin(arguments, "compare")
     from ...studies.compare import study
+    from ...studies.executors import opened
 
-    result = study.compare(
-        case,
-        arguments.fluids.split(","),
-        folder,
-        changes,
-        period=arguments.period,
-        transient=arguments.transient,
-        jobs=arguments.jobs,
-        log=tell,
-    )
+    with opened(arguments.executor, arguments.jobs) as pool:
+        result = study.compare(
+            case,
+            arguments.fluids.split(","),
+            folder,
+            changes,
+            period=arguments.period,
+            transient=arguments.transient,
+            jobs=arguments.jobs,
+            executor=pool,
+            log=tell,
+        )
     _print_comparison(result)
     tell(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     return 0 if all(column.outcome.done for column in result.columns) else 1

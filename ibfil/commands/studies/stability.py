@@ -20,9 +20,11 @@ def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     case, changes, folder = begin(arguments, "stability")
     varied = axes(arguments.vary)
+    from ...studies.executors import opened
     from ...studies.stability import study
 
-    result = study.stability(case, varied, folder, changes, jobs=arguments.jobs, log=tell)
+    with opened(arguments.executor, arguments.jobs) as pool:
+        result = study.stability(case, varied, folder, changes, jobs=arguments.jobs, executor=pool, log=tell)
     print_table(study.rows(result), ("message",))
     tell(
         "against a finer run, the largest over outputs: place and shape (without rigid motion), rms of nodes/L; "

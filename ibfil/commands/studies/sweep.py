@@ -25,13 +25,15 @@ def do(arguments: argparse.Namespace) -> int:
     case, changes, folder = begin(arguments, "sweep")
     varied = axes(arguments.vary)
     from ...studies import sweep
+    from ...studies.executors import opened
 
     if arguments.list:
         tell("\n".join(sweep.listing(case, varied, changes)))
         return 0
     if arguments.index is not None:
         return _one(sweep.run_one(case, varied, folder, arguments.index, changes))
-    rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, log=tell)
+    with opened(arguments.executor, arguments.jobs) as pool:
+        rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, executor=pool, log=tell)
     print_table([row.row() for row in rows], ("run", "message"))
     tell(folder / sweep.TABLE)
     return 0 if all(row.outcome.done for row in rows) else 1

@@ -37,20 +37,23 @@ def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     case, changes, folder = begin(arguments, "trade")
     varied = axes(arguments.vary)
+    from ...studies.executors import opened
     from ...studies.trade import study
 
-    result = study.trade(
-        case,
-        varied,
-        folder,
-        changes,
-        observe=arguments.observe.split(",") if arguments.observe else (),
-        repeat=arguments.repeat,
-        clock=arguments.clock,
-        budget=arguments.budget,
-        jobs=arguments.jobs,
-        log=tell,
-    )
+    with opened(arguments.executor, arguments.jobs) as pool:
+        result = study.trade(
+            case,
+            varied,
+            folder,
+            changes,
+            observe=arguments.observe.split(",") if arguments.observe else (),
+            repeat=arguments.repeat,
+            clock=arguments.clock,
+            budget=arguments.budget,
+            jobs=arguments.jobs,
+            executor=pool,
+            log=tell,
+        )
     print_table(study.rows(result), ("message",))
     tell(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     if arguments.wanted is None:
