@@ -16,10 +16,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import pyfftw
 from numba import njit
 
 from ..grid.fft import modes_of
+from ..grid.fftw import pyfftw
 from ..grid.periodic_grid import Grid
 from ..grid.slab_fft import Block
 from ..grid.spectral import solenoidal

@@ -16,9 +16,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pyfftw
 
 from .. import cache
+from .fftw import pyfftw
 
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # else FFTW's threads spin while they wait for a busy core
 

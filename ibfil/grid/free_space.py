@@ -24,8 +24,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+
+from .. import cache
 
 PARTS = {
     1: 6,
@@ -67,8 +70,10 @@ def response(parts: int, sizes: tuple[int, ...], extra: int = 34) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _cube(parts: int) -> np.ndarray:
-    """Those of the octant; not to be written to."""
-    out = response(parts, (REACH + RIM,) * 3)
+    """Those of the octant; not to be written to. The same for all scenes, and kept in the user's cache."""
+    sizes = (REACH + RIM,) * 3
+    key = {"free space": parts, "sizes": sizes, "versions": [np.__version__, code := cache.code(Path(__file__).parent)]}
+    out = cache.table(key, lambda: response(parts, sizes)) if code else response(parts, sizes)
     out.flags.writeable = False
     return out
 

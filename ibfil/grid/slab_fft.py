@@ -12,9 +12,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-import pyfftw
 
 from .fft import modes_of, plan, useful_threads
+from .fftw import pyfftw
 from .pruned_fft import run_of_cells
 from .spreading import Stencil, interpolate, spread
 

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache as once
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+import scipy
 
+from ... import cache
 from ...grid.kernels import Kernel
 from ...grid.periodic_grid import Grid
 from ...grid.spreading import Stencil
 from .. import mobility_table
 from ..coupling import Coupling
 from .base import TableMobility
+
+_LARGE = 2**17  # cells of a grid below which its table takes less than a tenth of a second
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,34 @@ class PeriodicSpace:
     def mobility(
         self, coupling: Coupling, points: int, viscosity: float, alpha: float = 0.0, number: type = np.float64
     ) -> TableMobility:
-        """By the grid's response to one cell."""
-        response = coupling.response(self.grid, viscosity, alpha)
-        return TableMobility(coupling, mobility_table.octant(response, points, number))
+        """By the grid's response to one cell, whose octant is kept in the user's cache where it is large."""
+
+        def made() -> np.ndarray:
+            return mobility_table.octant(coupling.response(self.grid, viscosity, alpha), points, number).values
+
+        values = cache.table(self._key(coupling, points, viscosity, number), made) if self._kept(alpha) else made()
+        return TableMobility(coupling, mobility_table.Octant(values, np.array(self.cells, np.int64)))
+
+    def _kept(self, alpha: float) -> bool:
+        """Whether it is worth it. With inertia each length of a step has a table: they would drive out all others."""
+        return alpha == 0 and int(np.prod(self.cells)) >= _LARGE and bool(_code())
+
+    def _key(self, coupling: Coupling, points: int, viscosity: float, number: type) -> dict[str, object]:
+        """All that an octant depends on."""
+        passed = f"{type(coupling).__module__}.{type(coupling).__qualname__}"
+        return {
+            "box": [float(side).hex() for side in self.box],
+            "cells": list(self.cells),
+            "points": points,
+            "viscosity": float(viscosity).hex(),
+            "number": np.dtype(number).str,
+            "coupling": passed,
+            "versions": [np.__version__, scipy.__version__, _code()],
+        }
+
+
+@once
+def _code() -> str:
+    """The code that makes octants."""
+    fluids = Path(__file__).parents[1]
+    return cache.code(fluids, fluids / "spaces", fluids.parent / "grid")
