@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import io
 import json
 import os
 import threading
@@ -79,8 +78,8 @@ def _locked(handle: int) -> bool:
 def table(key: Mapping[str, object], make: Callable[[], np.ndarray]) -> np.ndarray:
     """The array of that ``key`` (values as of JSON): as it is kept, or made and then kept. The bits are the same.
 
-    The key must name all that the array depends on, the code that makes it too (`code`). What is kept says its key and
-    its checksum: a file that is damaged, or of another key, is made again.
+    The key must name all that the array depends on, the code that makes it too (`code`). A file says its key and its
+    checksum: one that is damaged, or of another key, is made again. It holds bare numbers: nothing in it can run.
     """
     text = json.dumps(dict(key), sort_keys=True)
     path = folder() / "tables" / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.table"
@@ -88,8 +87,7 @@ def table(key: Mapping[str, object], make: Callable[[], np.ndarray]) -> np.ndarr
     if known is not None:
         return known
     made = make()
-    body = _as_npy(made)
-    content = _head(text, body) + body
+    content = _packed(text, made)
     if len(content) <= TABLES // 4 and keep(path, content):
         _bound(path.parent)
     return made
@@ -106,17 +104,10 @@ def code(*folders: Path) -> str:
     return found.hexdigest()[:16]
 
 
-def _head(text: str, body: bytes) -> bytes:
-    """The line before an array: its key and its checksum."""
-    return f"{text} {zlib.crc32(body):08x}\n".encode()
-
-
-def _as_npy(array: np.ndarray) -> bytes:
-    import numpy as np
-
-    out = io.BytesIO()
-    np.save(out, array, allow_pickle=False)
-    return out.getvalue()
+def _packed(text: str, array: np.ndarray) -> bytes:
+    """A file: a line with the checksum of all that follows; the key, the kind of number and the shape; the numbers."""
+    rest = f"{text}\n{array.dtype.str} {json.dumps(array.shape)}\n".encode() + array.tobytes()
+    return f"{zlib.crc32(rest):08x}\n".encode() + rest
 
 
 def _read_table(path: Path, text: str) -> np.ndarray | None:
@@ -126,11 +117,15 @@ def _read_table(path: Path, text: str) -> np.ndarray | None:
     try:
         if not path.is_file() or path.stat().st_size > TABLES:
             return None
-        head, _, body = path.read_bytes().partition(b"\n")
-        if head + b"\n" != _head(text, body):
+        checksum, _, rest = path.read_bytes().partition(b"\n")
+        if checksum != f"{zlib.crc32(rest):08x}".encode():
             return None
-        array: np.ndarray = np.load(io.BytesIO(body), allow_pickle=False)
-    except (OSError, ValueError):
+        key, kind, numbers = rest.split(b"\n", 2)
+        if key != text.encode():
+            return None
+        number, shape = kind.decode().split(" ", 1)
+        array: np.ndarray = np.frombuffer(numbers, number).reshape(json.loads(shape)).copy()
+    except (OSError, ValueError, TypeError):
         return None
     with suppress(OSError):
         os.utime(path)  # used now

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import pickle
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -56,28 +55,33 @@ def test_a_table_is_made_once_and_read_with_the_same_bits(own):
     assert len(list(own.iterdir())) == 2
 
 
+def signed(rest: bytes) -> bytes:
+    """A file whose checksum is right."""
+    return f"{zlib.crc32(rest):08x}\n".encode() + rest
+
+
 def damaged(content: bytes) -> dict[str, bytes]:
     at = len(content) - 20
-    flipped = content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
-    head, body = content.split(b"\n", 1)
+    rest = content.split(b"\n", 1)[1]
     return {
         "empty": b"",
-        "cut in its line": content[:10],
-        "cut in its head": content[: len(head) + 9],
+        "cut in its checksum": content[:4],
+        "cut in its key": content[:14],
         "cut in its numbers": content[:-8],
-        "one bit": flipped,
-        "of another key": content.replace(b'"size": 7', b'"size": 9'),
-        "of another shape": content.replace(b"(7, 3)", b"(3, 7)"),
-        "that claims too much": content.replace(b"(7, 3), }", b"(9**9,)  "),
-        "huge": content.replace(b"(7, 3), }          ", b"(700000000000, 3), }"[:19]),
-        "pickled": head + b"\n" + pickle.dumps(np.ones((7, 3))),
+        "one bit": content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :],
+        "of another shape": content.replace(b"[7, 3]", b"[3, 7]"),
+        "of another key": signed(rest.replace(b'"size": 7', b'"size": 9')),
+        "that claims too much": signed(rest.replace(b"[7, 3]", b"[700000000000, 3]")),
+        "of another number": signed(rest.replace(b"<f8", b"<f0")),
+        "of objects": signed(rest.replace(b"<f8", b"|O8")),
+        "of no shape": signed(rest.replace(b"[7, 3]", b'{"a": 1}')),
+        "pickled": signed(rest.split(b"\n")[0] + b"\n" + pickle.dumps(np.ones((7, 3)))),
         "no text": b"\xff\xfe" * 400,
         "endless line": b"x" * 2**18,
-        "swapped": body + b"\n" + head,
     }
 
 
-@pytest.mark.parametrize("what", list(damaged(b"a\n" + bytes(40))))
+@pytest.mark.parametrize("what", list(damaged(b"a\nb\n" + bytes(40))))
 def test_a_file_that_is_not_whole_is_made_again(own, what):
     right = cache.table(KEY, Maker())
     (path,) = own.iterdir()
@@ -90,24 +94,6 @@ def test_a_file_that_is_not_whole_is_made_again(own, what):
     assert make.made == 1
     assert got.tobytes() == right.tobytes()
     assert path.read_bytes() == content  # and is whole again
-
-
-def test_objects_are_never_loaded(own):
-    """A pickle in an array would run code."""
-    cache.table(KEY, Maker())
-    (path,) = own.iterdir()
-
-    class Runs:
-        def __reduce__(self):
-            return os.mkdir, (str(own / "ran"),)
-
-    out = io.BytesIO()
-    np.save(out, np.array([Runs()], dtype=object), allow_pickle=True)
-    path.write_bytes(cache._head(json.dumps(KEY, sort_keys=True), out.getvalue()) + out.getvalue())
-    make = Maker()
-    cache.table(KEY, make)
-    assert make.made == 1
-    assert not (own / "ran").exists()
 
 
 @pytest.mark.parametrize("where", ["ibfil", "ibfil/tables"])
