@@ -45,3 +45,18 @@ study locking stability swimmer_locked time.end=0.6283 time.step=0.0125664 outpu
 study explicit stability swimmer_rft time.end=0.01 output.every=0.002 time.scheme=explicit time.order=1 \
     'observe.speed.over=[0,0.01]' 'observe.sideways.over=[0,0.01]' \
     --vary filament.swimmer.nodes=11,16,21,31,41 --vary time.step=1e-4,3e-5,1e-5,3e-6,1e-6,3e-7
+
+# An error bar on the swimmer's speed, and where it comes from.
+study swimmer_uncertainty uncertainty swimmer_stokes --meant
+
+# Flutter of a clamped rod under a follower force: the threshold in resistive-force theory, and on grids in free space and in a box,
+# of rods 18 and 36 hydrodynamic radii long. flutter.py draws them together.
+study flutter_rft modes "$here/flutter.toml" fluid.model=rft fluid.box=absent fluid.thickness=absent --critical parameters.F0=24,40
+study flutter_free_18 modes "$here/flutter.toml" filament.rod.nodes=21 fluid.box=free fluid.thickness=0.05555555555555555 \
+    --critical parameters.F0=24,40
+study flutter_free_36 modes "$here/flutter.toml" filament.rod.nodes=41 fluid.box=free fluid.thickness=0.027777777777777776 \
+    --critical parameters.F0=24,40
+study flutter_box_18 modes "$here/flutter.toml" filament.rod.nodes=21 fluid.thickness=0.05555555555555555 \
+    --critical parameters.F0=24,40
+study flutter_box_36 modes "$here/flutter.toml" filament.rod.nodes=41 fluid.thickness=0.027777777777777776 \
+    --critical parameters.F0=24,40
