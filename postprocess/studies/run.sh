@@ -50,13 +50,17 @@ study explicit stability swimmer_rft time.end=0.01 output.every=0.002 time.schem
 study swimmer_uncertainty uncertainty swimmer_stokes --meant
 
 # Flutter of a clamped rod under a follower force: the threshold in resistive-force theory, and on grids in free space and in a box,
-# of rods 18 and 36 hydrodynamic radii long. flutter.py draws them together.
+# of rods 18, 27 and 36 hydrodynamic radii long. flutter.py draws them together.
 study flutter_rft modes "$here/flutter.toml" fluid.model=rft fluid.box=absent fluid.thickness=absent --critical parameters.F0=24,40
 study flutter_free_18 modes "$here/flutter.toml" filament.rod.nodes=21 fluid.box=free fluid.thickness=0.05555555555555555 \
+    --critical parameters.F0=24,40
+study flutter_free_27 modes "$here/flutter.toml" filament.rod.nodes=31 fluid.box=free fluid.thickness=0.037037037037037035 \
     --critical parameters.F0=24,40
 study flutter_free_36 modes "$here/flutter.toml" filament.rod.nodes=41 fluid.box=free fluid.thickness=0.027777777777777776 \
     --critical parameters.F0=24,40
 study flutter_box_18 modes "$here/flutter.toml" filament.rod.nodes=21 fluid.thickness=0.05555555555555555 \
+    --critical parameters.F0=24,40
+study flutter_box_27 modes "$here/flutter.toml" filament.rod.nodes=31 fluid.thickness=0.037037037037037035 \
     --critical parameters.F0=24,40
 study flutter_box_36 modes "$here/flutter.toml" filament.rod.nodes=41 fluid.thickness=0.027777777777777776 \
     --critical parameters.F0=24,40

@@ -72,7 +72,8 @@ def _of(bar: Bar) -> Iterator[str]:
     if bar.meant is not None:
         yield "  as meant, the choices taken out:"
         yield from _table(bar, False)
-        yield f"  as meant: {with_bar(*bar.meant)}"
+        unknown = [one.name for one in bar.sources if not one.numerical and one.estimate is None]
+        yield f"  as meant: {with_bar(*bar.meant)}" + (f", but for {', '.join(unknown)}" if unknown else "")
     if bar.halves is not None and not bar.settled:
         both = " and ".join(f"{value:.4g}" for value in bar.halves)
         yield f"  not settled: over the two halves of its window it is {both}; the bar is for the window as it is"
