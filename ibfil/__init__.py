@@ -44,7 +44,6 @@ from .version import __version__
 
 if TYPE_CHECKING:
     from .analysis.run import Run
-    from .analysis.run import open_run as open
     from .case.reading import parse_case, read_case
     from .case.schema import Case
     from .errors import CaseError, Interrupted, RunFailed
@@ -52,6 +51,7 @@ if TYPE_CHECKING:
     from .simulation.simulation import Simulation
     from .studies.member import Member, Outcome
     from .studies.members import run_members
+    from .visualization.pictured_run import open_run as open
     from .visualization.vtk_files import write_vtk
 
 _HOME = {
@@ -65,7 +65,7 @@ _HOME = {
     "Outcome": "studies.member",
     "run_members": "studies.members",
     "Run": "analysis.run",
-    "open": "analysis.run:open_run",
+    "open": "visualization.pictured_run:open_run",
     "run": "running.run",
     "Simulation": "simulation.simulation",
     "write_vtk": "visualization.vtk_files",

@@ -45,6 +45,12 @@ def on_terminal() -> bool:
         return False
 
 
+def in_notebook() -> bool:
+    """Whether cells of a notebook show what is printed."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return type(shell).__name__ == "ZMQInteractiveShell"
+
+
 def prepare() -> None:
     """Have a process begin with three open streams that take every letter.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,22 +17,6 @@ if TYPE_CHECKING:
     import xarray
 
     from .flow import Flow
-
-
-def open_run(path: str | Path) -> Run:
-    """Open the run file ``path`` for reading; close it or use it in a ``with``.
-
-    A run that is still being written can be open at the same time, and shows its outputs so far. Several threads may
-    ask one opened run. Raises RunFileError (a
-    CaseError), with one line, for what is not there, is no run file, is of another format version or is damaged.
-
-    >>> with ibfil.open("run.h5") as run:
-    ...     tip = run.filaments["rod"]["position"][-1, -1]  # reads three numbers of the file
-    ...     bend = run.filaments["rod"]["strain"][:, :, 0]
-    ...     print(len(run), run.time[-1], tip.shape, bend.shape)
-    3 0.002 (3,) (3, 9)
-    """
-    return Run(path)
 
 
 class Run(RunFile):
@@ -70,6 +55,12 @@ class Run(RunFile):
         from ..observables.factory import numbers_of
 
         return {name: one.value for name, one in numbers_of(self.case, self.time, self.observables).items()}
+
+    def _repr_html_(self) -> str:
+        """All that `ibfil show` tells, in a notebook."""
+        from .summary import as_text, digest
+
+        return f"<pre>{escape(as_text(digest(self)))}</pre>"
 
     def output_at(self, time: float | None = None) -> int:
         """The number of the output nearest to ``time``; the last by default. Raises CaseError outside of the run."""

@@ -6,6 +6,8 @@ KEY=absent takes the key out, which is what the listing of the schema calls a ke
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePath
 from typing import Any, get_origin
 
 from .expressions import suggestion
@@ -15,6 +17,35 @@ from .toml import load
 NAMED = {"filament": "rod", "observe": "tip", "expect": "tip"}  # tables whose names are the user's, and such a name
 ABSENT = "absent"  # the value that takes a key out
 FORM = "KEY=VALUE, KEY a dotted path such as fluid.viscosity or stop.0.below"
+
+
+Overrides = Sequence[str] | Mapping[str, Any]  # "KEY=VALUE" as on the command line, or from Python {"KEY": value}
+
+
+def pairs(overrides: Overrides) -> Iterator[tuple[list[str], Any] | Fault]:
+    """The path and the value of each override, or its fault; a value None takes the key out."""
+    if isinstance(overrides, str):
+        overrides = (overrides,)
+    if not isinstance(overrides, Mapping):
+        yield from map(split, overrides)
+        return
+    for key, value in overrides.items():
+        path = str(key).split(".")
+        if all(path):
+            yield path, ABSENT if value is None else plain(value)
+        else:
+            yield Fault("overrides", shown(key), "a dotted path such as fluid.viscosity or stop.0.below")
+
+
+def plain(value: Any) -> Any:
+    """A value made in Python as TOML has it: arrays and tuples are lists, paths texts; keys that are None left out."""
+    if hasattr(value, "tolist"):  # of numpy, which is not loaded for this
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    return str(value) if isinstance(value, PurePath) else value
 
 
 def split(text: str) -> tuple[list[str], Any] | Fault:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import keyword
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,8 @@ from .expressions import (
     parse,
 )
 from .faults import Fault, Found, dotted, entry_of, example, found_by_pydantic, known_keys, shown
-from .overrides import NAMED, apply, split
+from .library import find
+from .overrides import NAMED, Overrides, apply, pairs, plain
 from .schema import Case, Scene
 from .toml import load
 from .values import keys
@@ -40,8 +41,26 @@ _NAME = re.compile(r"[A-Za-z0-9_-]+")
 _NUMBERS = ("value", "range", "tolerance", "absolute")  # of [expect.NAME], which its quick form may replace
 
 
-def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
-    """The case in the file ``path``, with ``KEY=VALUE`` overrides. Raises CaseError, one line a fault."""
+FROM_PYTHON = "case from Python"  # its name in messages; files it reads lie in the present folder
+
+Source = Case | str | Path | Mapping[str, Any]
+
+
+def read_case(source: Source, overrides: Overrides = ()) -> Case:
+    """The case of a file, of the name of a shipped one, of a dict as a file would hold it, or another one changed.
+
+    ``overrides`` as on the command line, or {"time.end": 2.0, ...}: values may be arrays, None takes a key out. The
+    text of the case, which a run file records, has them. Raises CaseError, one line a fault.
+
+    >>> case = ibfil.read_case("swimmer_rft", {"time.end": 0.5})
+    >>> ibfil.read_case(case, {"fluid.viscosity": 2.0}).time.end
+    0.5
+    """
+    if isinstance(source, Case):
+        return parse_case(source.text, source.file, overrides) if overrides else source
+    if isinstance(source, Mapping):
+        return parse_case(_toml(source), FROM_PYTHON, overrides)
+    path = find(str(source))
     try:
         with Path(path).open("rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -56,15 +75,15 @@ def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     return parse_case(text, str(path), overrides)
 
 
-def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
-    """The case in the TOML ``text``, called ``name`` in messages. Raises CaseError, one line a fault."""
+def parse_case(text: str, name: str, overrides: Overrides = ()) -> Case:
+    """The case in the TOML ``text``, called ``name`` in messages; overrides as in `read_case`. Raises CaseError."""
     if len(text) > MAX_BYTES:
         raise CaseError([f"{name}: {len(text)} characters; a case has at most {MAX_BYTES}"])
     try:
         raw = load(text)
     except ValueError as error:
         raise CaseError([f"{name}: not TOML: {error}"]) from None
-    raw, faults = _overridden(raw, [split(override) for override in overrides])
+    raw, faults = _overridden(raw, list(pairs(overrides)))
     old = modernise(raw)
     scene, more = _read(raw)
     faults += more
@@ -73,6 +92,14 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
         told = list(dict.fromkeys(fault.line(name) for fault in faults))
         raise CaseError(told[:MAX_FAULTS] + [f"{name}: more faults follow these"] * (len(told) > MAX_FAULTS))
     return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name, deprecated=tuple(old))
+
+
+def _toml(content: Mapping[str, Any]) -> str:
+    """The text of a dict. Raises CaseError for a value that TOML has not."""
+    try:
+        return tomli_w.dumps(plain(content))
+    except TypeError as error:
+        raise CaseError([f"{FROM_PYTHON}: {error}; allowed: numbers, texts, lists, arrays and dicts of them"]) from None
 
 
 def quick_case(case: Case, name: str) -> Case:

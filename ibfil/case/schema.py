@@ -8,6 +8,7 @@ before a case is read, and the text here says so.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -291,6 +292,19 @@ class Case(Scene):
     text: str
     file: str
     deprecated: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        names = list(self.filaments)
+        rods = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+        return (
+            f"<Case {self.file}: {self.title or 'untitled'}; {rods}; fluid {self.fluid.words}; t = {self.time.end:g}>"
+        )
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """Its line, and its text to be opened, in a notebook."""
+        return f"<details><summary>{escape(repr(self)[1:-1])}</summary><pre>{escape(self.text)}</pre></details>"
 
     @property
     def reads(self) -> list[Path]:

@@ -91,12 +91,11 @@ def add_case(command: argparse.ArgumentParser, nargs: str = "+") -> None:
 
 def read_case(words: Sequence[str]) -> Case:
     """The case with its overrides; sets the number of threads, which libraries read once, when they load."""
-    from ..case.library import find
     from ..case.reading import read_case
 
     name, *changes = words
     only_changes(changes)
-    case = read_case(find(name), changes)
+    case = read_case(name, changes)
     set_threads(case.compute.threads)
     return case
 

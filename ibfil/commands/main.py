@@ -47,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         found = f"not enough memory ({error})" if str(error) else "not enough memory"
         return _say([found, "what to change: fewer nodes, cells or outputs, or a machine with more"], FAILED)
     except CaseError as error:
-        return _say(error.faults, BAD_INPUT)
+        return _say([fault.replace("overwrite=True", "--force") for fault in error.faults], BAD_INPUT)
     except RunFailed as error:
         return _say(str(error).splitlines(), FAILED)
     except (Interrupted, KeyboardInterrupt) as error:

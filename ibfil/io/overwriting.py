@@ -102,7 +102,7 @@ def refuse(path: Path, kind: Kind, force: bool, reads: Iterable[Path] = ()) -> N
     if not kind.fits(path, head):
         raise RunFileError(f"{path}: is there, and not {kind.words}: it is not replaced; choose another name")
     if not force:
-        raise RunFileError(f"{path}: exists already; --force writes over it")
+        raise RunFileError(f"{path}: exists already; overwrite=True writes over it")
     if not os.access(path, os.W_OK):
         raise RunFileError(f"{path}: cannot be written (Permission denied)")
 

@@ -1,8 +1,9 @@
 """How far a run is, how fast it steps, and Ctrl-C between two steps.
 
-Progress is a bar on a terminal, a line now and then elsewhere. The pace, which `ibfil trade` puts against the error, is
-taken without start-up: its clocks start when the first step of a process is taken, so that loading, compiling and
-planning are left out, and stand still at outputs; the parts of a run that was cut are added up.
+Progress is a bar on a terminal and in a notebook, a line now and then elsewhere. The pace, which `ibfil trade` puts
+against the error, is taken without start-up: its clocks start when the first step of a process is taken, so that
+loading, compiling and planning are left out, and stand still at outputs; the parts of a run that was cut are added
+up.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from ..screen import on_terminal
+from ..screen import in_notebook, on_terminal
 
 _LINE_EVERY = 60.0  # seconds at most between two lines
 _TENTHS = 10  # lines of a short run
@@ -31,13 +32,14 @@ class Progress:
         self._end, self._log, self._show = end, log, show
         self._began = self._said = clock.monotonic()
         self._tenth = int(_TENTHS * start / end)
-        self._bar = self._make_bar(start) if show and on_terminal() else None
+        self._bar = self._make_bar(start) if show and (on_terminal() or in_notebook()) else None
 
     def _make_bar(self, start: float) -> Any:
         from tqdm import tqdm
 
         form = "{percentage:3.0f}% |{bar}| t = {n:.4g} of {total:.4g} [{elapsed}<{remaining}{postfix}]"
-        return tqdm(total=self._end, initial=start, bar_format=form, file=sys.stderr, leave=False)
+        stream = sys.stdout if in_notebook() else sys.stderr  # which a notebook shows in red
+        return tqdm(total=self._end, initial=start, bar_format=form, file=stream, leave=False)
 
     def tell(self, time: float, steps: int) -> None:
         """Move the bar; or say a line where a tenth more is done, or a minute has passed."""

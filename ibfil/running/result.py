@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,6 +39,16 @@ class Result:
             f"{name} = {np.array2string(np.asarray(one.value), precision=6)}" for name, one in self.summaries.items()
         )
         return f"<Result {self.status}: {self.steps} steps, t = {self.snapshot.time:g}; {found or 'no observables'}>"
+
+    def _repr_html_(self) -> str:
+        """Its line, and a table of the observables, in a notebook."""
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(np.array2string(np.asarray(one.value), precision=6))}</td>"
+            f"<td>{escape(one.note)}</td></tr>"
+            for name, one in self.summaries.items()
+        )
+        line = f"{self.status}: {self.steps} steps, t = {self.snapshot.time:g} {self.reason}"
+        return f"<p>{escape(line)}</p><table><tr><th>observable</th><th>value</th><th></th></tr>{rows}</table>"
 
     @property
     def times(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +26,8 @@ from .loop import Loop
 from .result import Result
 
 if TYPE_CHECKING:
+    from ..case.overrides import Overrides
+    from ..case.reading import Source
     from ..case.schema import Case
     from ..rods.constitutive import MomentLaw
     from ..simulation.simulation import Simulation
@@ -35,9 +37,10 @@ if TYPE_CHECKING:
 
 
 def run(
-    case: Case | str | Path,
+    case: Source,
     output: str | Path | None = None,
     *,
+    overrides: Overrides = (),
     overwrite: bool = False,
     resume: bool = False,
     progress: bool = True,
@@ -47,7 +50,9 @@ def run(
     build: Build | None = None,
     look: Look = overview_of,
 ) -> Result:
-    """Run a case (or the case file of that name) and write the run file ``output``; None writes nothing.
+    """Run a case and write the run file ``output``; None writes nothing.
+
+    The case is one that was read, a file, the name of a shipped case, or a dict; ``overrides`` as in `read_case`.
 
     With ``resume`` it goes on from the checkpoint of ``output`` if there is one, or makes a finished run longer.
     ``observables`` are further ones, made
@@ -62,8 +67,7 @@ def run(
     >>> print(result.status, result.times.shape, result.series("tip").shape)
     finished (3,) (3, 3)
     """
-    if isinstance(case, str | Path):
-        case = read_case(case)
+    case = read_case(case, overrides)
     build = build or _builder(laws)
     path = None if output is None else Path(output)
     if path is not None and resume and checkpoint_path(path).exists() and case.time.end > _end_of(path):
@@ -82,7 +86,7 @@ def run(
 def resume_run(
     path: str | Path,
     case: Case | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Overrides = (),
     *,
     progress: bool = True,
     log: Callable[[str], object] = tell,

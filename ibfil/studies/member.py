@@ -24,13 +24,12 @@ class Member:
 
     def resolved(self) -> Case:
         """Return the case that is run, on one thread. Raises CaseError, one line a fault."""
-        from ..case.library import find
         from ..case.reading import parse_case, read_case
 
         overrides = (*self.overrides, "compute.threads=1")
         if "\n" in self.case:
             return parse_case(self.case, f"{self.name}.toml", overrides)
-        return read_case(find(self.case), overrides)
+        return read_case(self.case, overrides)
 
 
 @dataclass(frozen=True)

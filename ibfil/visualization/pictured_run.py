@@ -1,0 +1,91 @@
+"""A run opened from Python, with its pictures: `ibfil.open`."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..analysis.run import Run
+from ..errors import CaseError
+from ..io.overwriting import refuse
+
+
+def open_run(path: str | Path) -> PicturedRun:
+    """Open the run file ``path`` for reading; close it or use it in a ``with``.
+
+    A run that is still being written can be open at the same time, and shows its outputs so far. Several threads may
+    ask one opened run. Raises RunFileError (a CaseError), with one line, for what is not there, is no run file, is of
+    another format version or is damaged.
+
+    >>> with ibfil.open("run.h5") as run:
+    ...     tip = run.filaments["rod"]["position"][-1, -1]  # reads three numbers of the file
+    ...     bend = run.filaments["rod"]["strain"][:, :, 0]
+    ...     print(len(run), run.time[-1], tip.shape, bend.shape)
+    3 0.002 (3,) (3, 9)
+    """
+    return PicturedRun(path)
+
+
+@dataclass(frozen=True, repr=False)
+class Picture:
+    """A picture that a notebook shows; ``png`` are its bytes."""
+
+    png: bytes
+
+    def __repr__(self) -> str:
+        return f"<Picture of {len(self.png)} bytes; a notebook shows it>"
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+class PicturedRun(Run):
+    """A run, and its pictures as `ibfil show --plot` and `ibfil render` make them, shown by a notebook or in a file."""
+
+    def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> Picture | Path:
+        """The figure of the run: shapes, path, observables. In the file ``path`` (png, pdf, svg), or to be shown.
+
+        Raises CaseError for another ending, and where the file exists and ``overwrite`` is not set.
+
+        >>> with ibfil.open("run.h5") as run:
+        ...     picture = run.plot()
+        >>> picture.png[1:4]
+        b'PNG'
+        """
+        from .run_figure import draw, kind_of
+
+        if path is None:
+            return _shown(lambda place: draw(self, place))
+        refuse(Path(path), kind_of(Path(path)), overwrite, [self.path])
+        draw(self, path)
+        return Path(path)
+
+    def render(self, path: str | Path | None = None, *, overwrite: bool = False, **wishes: Any) -> Picture | Path:
+        """The rods to scale, at one time or over the run. In the file ``path`` (png, mp4, gif), or to be shown.
+
+        ``wishes`` are those of render.Wish: colour="tension", flow="slice", time=1.0, size=(1280, 960), montage=5,
+        fps=25, every=1. Raises CaseError for others, for what cannot be drawn, and where the file exists and
+        ``overwrite`` is not set.
+        """
+        from .render import Wish, render
+
+        strange = [name for name in wishes if name not in Wish._fields]
+        if strange:
+            raise CaseError([f"{strange[0]}: found a wish of that name; allowed: {', '.join(Wish._fields)}"])
+        try:
+            if path is None:
+                return _shown(lambda place: render(self.path, place, Wish(**wishes), overwrite=True))
+            return render(self.path, path, Wish(**wishes), overwrite=overwrite)
+        except CaseError as error:  # which names the arguments of the command line
+            raise CaseError([fault.replace("--", "") for fault in error.faults]) from None
+
+
+def _shown(make: Callable[[Path], object]) -> Picture:
+    """The picture that is made in a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) / "picture.png"
+        make(place)
+        return Picture(place.read_bytes())
