@@ -212,7 +212,7 @@ def test_reading_files(tmp_path):
         (line,) = caught.value.faults
         assert line.startswith(f"{path}: ")
     for missing in (tmp_path, tmp_path / "no.toml"):
-        with pytest.raises(CaseError, match="is a folder|no such file, and no shipped case"):
+        with pytest.raises(CaseError, match=r"is a folder|no such file, and no shipped case"):
             read_case(missing)
 
 
