@@ -110,3 +110,47 @@ def test_tables_keep_all_digits_and_json_has_no_nan(tmp_path):
     assert (tmp_path / "t.csv").read_text() == 'a,b\n0.30000000000000004,\n,"x,y"\n'
     write_json(tmp_path / "t.json", {"a": [float("nan"), 1.0]})
     assert "null" in (tmp_path / "t.json").read_text()
+
+
+def test_ranges_and_tables_of_points(tmp_path):
+    assert axis("a=1:2:5,7").values == (("1",), ("1.25",), ("1.5",), ("1.75",), ("2",), ("7",))
+    assert axis("a=0.1:0.3:3").values == (("0.1",), ("0.2",), ("0.3",))
+    assert axis("a=1e-3:1e1:5:log").values == (("0.001",), ("0.01",), ("0.1",), ("1",), ("10",))
+    assert axis("nodes=81:21:4 & b=1:2:4").values[1] == ("61", "1.333333333")
+    table = tmp_path / "points.csv"
+    table.write_text('fluid.viscosity, time.step\n1,0.1\n"2", 0.2\n\n')
+    points = axis(f"@{table}")
+    assert points.keys == ("fluid.viscosity", "time.step")
+    assert points.values == (("1", "0.1"), ("2", "0.2"))
+    assert [one.name for one in combinations([points])] == ["viscosity=1,step=0.1", "viscosity=2,step=0.2"]
+    table.write_text('a,b\n"[1,2]",x\n')
+    assert axis(f"@{table}").values == (("[1,2]", "x"),)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("a=1:2:1", "N from 2 to 10000"),
+        ("a=1:1:3", "two ends"),
+        ("a=0:2:3:log", "with log, ends above 0"),
+        ("a=1:2:2.5", "numbers, START:STOP:N"),
+        ("@no.csv", "no.csv cannot be read (No such file or directory)"),
+    ],
+)
+def test_faults_of_ranges_are_one_line(text, told):
+    with pytest.raises(CaseError) as caught:
+        axis(text)
+    assert f"--vary {text}: " in caught.value.faults[0]
+    assert told in caught.value.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [("a,b\n", "found 1 rows"), ("a,b\n1\n", "found 1 values in row 2; allowed: 2"), ("a,a\n1,2\n", "the key a twice")],
+)
+def test_faults_of_tables_of_points_are_one_line(tmp_path, content, told):
+    table = tmp_path / "points.csv"
+    table.write_text(content)
+    with pytest.raises(CaseError) as caught:
+        axis(f"@{table}")
+    assert told in caught.value.faults[0]

@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from ...studies.settings import Axis
 
 CASE = "the case, a file or a shipped name, and changes to it that hold for all runs"
-VARY = "what is varied: KEY=V1,V2,..., any number of times; keys that change together: KEY=V1,V2&OTHER=W1,W2"
+VARY = (
+    "what is varied: KEY=V1,V2,..., any number of times; a range START:STOP:N or START:STOP:N:log among values; keys "
+    "that change together: KEY=V1,V2&OTHER=W1,W2; or @POINTS.csv, a table with keys above and a point in each row"
+)
 
 EXECUTOR = "runs go to the executor of FACTORY(N of --jobs): a cluster's, loky's ... (ibfil/studies/README.md)"
 
