@@ -56,12 +56,6 @@ class Run(RunFile):
 
         return {name: one.value for name, one in numbers_of(self.case, self.time, self.observables).items()}
 
-    def _repr_html_(self) -> str:
-        """All that `ibfil show` tells, in a notebook."""
-        from .summary import as_text, digest
-
-        return f"<pre>{escape(as_text(digest(self)))}</pre>"
-
     def output_at(self, time: float | None = None) -> int:
         """The number of the output nearest to ``time``; the last by default. Raises CaseError outside of the run."""
         if time is None:
@@ -154,6 +148,12 @@ class Run(RunFile):
                 about = {"units": self.units(f"{group}/{name}"), "description": self.description(f"{group}/{name}")}
                 variables[name] = (dims, np.asarray(column), about)
         return xarray.Dataset(variables, coordinates, {"title": self.case.title, "case": self.case_text})
+
+    def _repr_html_(self) -> str:
+        """All that `ibfil show` tells, in a notebook."""
+        from .summary import as_text, digest
+
+        return f"<pre>{escape(as_text(digest(self)))}</pre>"
 
     def _about(self, name: str, key: str) -> dict[str, str]:
         path = f"filaments/{name}/{key}"

@@ -8,7 +8,6 @@ before a case is read, and the text here says so.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -304,6 +303,8 @@ class Case(Scene):
 
     def _repr_html_(self) -> str:
         """Its line, and its text to be opened, in a notebook."""
+        from html import escape
+
         return f"<details><summary>{escape(repr(self)[1:-1])}</summary><pre>{escape(self.text)}</pre></details>"
 
     @property
