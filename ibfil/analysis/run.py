@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from .flow import Flow
 
 
+def open_run(path: str | Path) -> Run:
+    """The run in the file ``path``, open for reading, without the pictures that `ibfil.open` gives; raises as that."""
+    return Run(path)
+
+
 class Run(RunFile):
     """A run file, open for reading: lazy arrays, the flow at any point, meshes. Made by `ibfil.open`.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from ..analysis.meshes import filament_data, rods_of
-from ..analysis.run import Run
+from ..analysis.run import Run, open_run
 from ..assembly.fluids.models import fluid_model
 from ..errors import CaseError
 from ..io.overwriting import BY_ENDING, refuse, replacing
@@ -78,7 +78,7 @@ def render(
     if not can_render():
         line = f"pictures cannot be rendered here; install the Debian packages {PACKAGES}"
         raise CaseError([f"{path}: {line} (apt-get install libegl1 libgl1-mesa-dri)"])
-    with _TURN, Run(run) as opened:
+    with _TURN, open_run(run) as opened:
         if wish.flow != "none":
             opened.velocity_at(np.zeros((1, 3)))  # where there is no flow it says so
         pictures = _Pictures(opened, wish)

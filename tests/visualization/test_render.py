@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from helpers.made_run import make_run
 
+from ibfil.analysis.run import open_run
 from ibfil.commands.main import main
 from ibfil.errors import CaseError
 from ibfil.visualization import render
 from ibfil.visualization.annotations import Words, bands, lettered
 from ibfil.visualization.camera import viewpoint
-from ibfil.visualization.pictured_run import open_run
 from ibfil.visualization.render import Wish
 from ibfil.visualization.stage import Scale, frame_for
 
