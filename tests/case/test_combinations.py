@@ -89,6 +89,20 @@ COMBINATIONS = [
     ([f"{ROD}.twist_rate=1"], f"{ROD}.twist_rate", "only with twisting"),
     ([f"{ROD}.twist_rate=0*s"], f"{ROD}.twist_rate", "only with twisting"),
     ([f"{ROD}.shape.twist=s"], f"{ROD}.shape.twist", "only with twisting"),
+    ([f"{ROD}.finish.moment=[5, 0, 0]"], f"{ROD}.finish.moment", "only with twisting"),
+    ([f"{ROD}.finish={{moment=[0, 0, 't'], frame='body'}}"], f"{ROD}.finish.moment", "only with twisting"),
+    ([f"{ROD}.finish.moment=[0, 1, 0]", f"{ROD}.direction=[1, 1, 0]"], f"{ROD}.finish.moment", "only with twisting"),
+    (
+        [f"{ROD}.finish.moment=[0, 1, 0]", f"{ROD}.shape={{kind='circle', curvature=1}}"],
+        f"{ROD}.finish.moment",
+        "only with twisting",
+    ),
+    ([f"{ROD}.curvature=[1, 0]", "fluid.flow=[0, 0, 'x']"], "fluid.flow", "plane"),
+    (
+        [f"{ROD}.curvature=[1, 0]", "fluid.flow=[0, 0, 1]", f"{ROD}.start.end=hinged"],
+        "fluid.flow",
+        "plane",
+    ),
     ([f"{ROD}.loads.moment=[0, 0, 's']"], f"{ROD}.loads.moment.2", "only with twisting"),
     ([f"{ROD}.curvature=[1, 't']"], f"{ROD}.curvature", "3-D curvature only with twisting"),
     # without twisting, out of the plane
@@ -305,6 +319,9 @@ SOUND = [
     [f"{ROD}.curvature=[1, 0]", "fluid.flow=['-x', '3*y', '-2*z']", f"{ROD}.shape={{kind='circle', curvature=1}}"],
     [f"{ROD}.curvature=[1, 0]", f"{ROD}.position=[0, 0, 1]", "fluid.flow=[1, 0, '1 - z']"],
     [f"{ROD}.curvature=[1, 0]", f"{ROD}.finish={{moment=[0, 0, 1], force=[1, 1, 0]}}"],
+    [f"{ROD}.finish.moment=[0, 1, 2]"],
+    [f"{ROD}.finish.moment=[0, 0, 2]", f"{ROD}.shape={{kind='circle', curvature=1}}"],
+    [f"{ROD}.curvature=[1, 0]", "fluid.flow=[0, 0, '1 + sin(t)']"],
     [f"{ROD}.curvature=[1, 0]", f"{ROD}.loads={{moment=[1, 0, 0], internal_moment=[1, 0], body_force=[0, 1, 0]}}"],
     [f"{ROD}.curvature=[1, 0]", *THERMAL, "thermal.directions=xy"],
     [

@@ -15,7 +15,7 @@ from ..faults import Fault
 from ..filament import End, Filament, Loads
 from ..fluid import Fluid
 from ..schema import Scene
-from ..shape import Circle, ExpressionShape, Helix
+from ..shape import Circle, ExpressionShape, Helix, Straight
 
 Vector = tuple[float, float, float]
 Components = Sequence[Expression] | Sequence[float]
@@ -57,9 +57,25 @@ def _twists(filament: Filament) -> Iterator[str]:
                 yield f"{side}.{name}"
         if end.end == "clamped" and end.twist == "free":
             yield f"{side}.twist"
+        if end.moment is not None and _about_the_rod(end, filament):
+            yield f"{side}.moment"
     loads = filament.loads
     if loads is not None and loads.moment is not None and not _zero(loads.moment[2]):
         yield "loads.moment.2"
+
+
+def _about_the_rod(end: End, filament: Filament) -> bool:
+    """Whether the moment at an end has a part along the rod there, as far as a case tells where that points."""
+    assert end.moment is not None
+    if end.frame == "body":
+        return not _zero(end.moment[2])
+    directors = _directors(filament)
+    shape = filament.shape
+    if directors is None or not isinstance(shape, Straight | Circle):
+        return isinstance(shape, Helix)  # which points everywhere
+    bent = isinstance(shape, Circle) and shape.curvature != 0.0
+    rod = directors[1:] if bent else directors[2:]  # an arc turns e3 towards e2
+    return any(_along(end.moment, axis, filament) for axis in rod)
 
 
 def _leaving(key: str, filament: Filament, case: Scene, axis: int) -> list[str]:
@@ -175,14 +191,34 @@ def _along(components: Components, normal: Vector, filament: Filament) -> bool:
 
 
 def _flow_leaves(fluid: Fluid, filament: Filament, directors: tuple[Vector, Vector, Vector], axis: int) -> bool:
-    """Whether the flow, at some points of the plane and some times, leads out of it."""
+    """Whether the flow, at some points of the plane and some times, leads out of it.
+
+    One that is the same everywhere carries a free filament along as it is, and its plane with it.
+    """
     assert fluid.flow is not None
-    inside = (directors[1 - axis], directors[2])
-    for a, b, t in ((0.0, 0.0, 0.0), (0.3, 0.1, 0.17), (-0.2, 0.4, 0.53), (-0.4, -0.3, 1.3)):
-        place = [p + filament.length * (a * u + b * v) for p, u, v in zip(filament.position, *inside, strict=True)]
-        if _component(fluid.flow, directors[axis], dict(zip("xyz", place, strict=True), t=t)):
+    basis = (directors[1 - axis], directors[2], directors[axis])
+    held = any(end.held or end.spring is not None for end in (filament.start, filament.finish))
+    for t in (0.0, 0.17, 0.53, 1.3):
+        places = []
+        for a, b, c in ((0.0, 0.0, 0.1), (0.3, 0.1, -0.2), (-0.2, 0.4, 0.3), (-0.4, -0.3, 0.5)):
+            for parts in ((a, b, 0.0), (a, b, c)):
+                away = [sum(q * u[k] for q, u in zip(parts, basis, strict=True)) for k in range(3)]
+                where = [p + filament.length * d for p, d in zip(filament.position, away, strict=True)]
+                places.append(dict(zip("xyz", where, strict=True), t=t))
+        if not any(_component(fluid.flow, directors[axis], place) for place in places[::2]):
+            continue
+        try:
+            found = [_value(fluid.flow, directors[axis], place) for place in places]
+        except ExpressionError:
+            return True
+        if held or max(found) - min(found) > 1e-9 * max(map(abs, found)):
             return True
     return False
+
+
+def _value(components: Components, normal: Vector, values: dict[str, float]) -> float:
+    """The component of a vector along ``normal``."""
+    return _dot([c.at(**values) if isinstance(c, Expression) else c for c in components], normal)
 
 
 def _component(components: Components, normal: Vector, values: dict[str, float]) -> bool:
