@@ -17,6 +17,21 @@ if TYPE_CHECKING:
     from ..case.schema import Case
 
 
+BUCKLING = 10.0  # A/L^2: about pi^2, the push at which a filament would rather bend
+
+
+def strength(case: Case) -> float:
+    """The force of repulsion at contact: what the case gives, else 10 A/L^2 of the filament that has the most."""
+    assert case.contact is not None
+    if case.contact.strength is not None:
+        return case.contact.strength
+    most = 0.0
+    for filament in case.filaments.values():
+        s = np.linspace(0.0, filament.length, filament.nodes)
+        most = max(most, *(float(np.max(alone(modulus, s))) / filament.length**2 for modulus in filament.bending))
+    return BUCKLING * most
+
+
 def contact(
     case: Case, names: Sequence[str], filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray
 ) -> Contact:
@@ -45,5 +60,5 @@ def contact(
             raise CaseError([f"{case.file}: contact.distance: found {widest:g}; allowed: {allowed}"])
     offsets = [where.start for where in nodes]
     if given.action == "repel":
-        return ContactRepels(segments, names, offsets, box, given.strength)
+        return ContactRepels(segments, names, offsets, box, strength(case))
     return (ContactStops if given.action == "stop" else ContactWarns)(segments, names, offsets, box)

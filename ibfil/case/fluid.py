@@ -22,7 +22,10 @@ class Contact(Table):
 
     action: Literal["stop", "warn", "repel"] = Field("stop", description="what to do at contact")
     distance: Positive | None = Field(None, description="distance of the axes at contact; absent: the sum of radii")
-    strength: Positive = Field(1.0, description="repel: force at contact; the range is distance")
+    strength: Positive | None = Field(
+        None,
+        description="repel: force at contact, by default 10 A/L^2, the most of all filaments; the range is distance",
+    )
 
     @property
     def repels(self) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..assembly.contact import strength
 from ..assembly.fluids.models import fluid_model
 from ..assembly.loads import ALONG, ON_ENDS, named
 from ..case.idle import idle_keys
@@ -81,17 +82,18 @@ def modelled(case: Case) -> list[str]:
         by = "their radius" if case.fluid.aspect is None else f"an aspect ratio of {case.fluid.aspect:g} when straight"
         out.append(f"the couple of flows across the rods' thickness, by {by}: straight ones tumble in a shear")
     if case.contact is not None:
-        out.append(_contact(case.contact))
+        out.append(_contact(case, case.contact))
     out += fluid_model(case).modelled()
     return out if case.thermal is None else [*out, _thermal(case.thermal)]
 
 
-def _contact(contact: Contact) -> str:
+def _contact(case: Case, contact: Contact) -> str:
     where = "the sum of radii" if contact.distance is None else f"{contact.distance:g}"
+    default = " (10 A/L^2, as contact.strength is not given)" if contact.strength is None else ""
     acts = {
         "stop": "the first ends the run",
         "warn": "the first is told",
-        "repel": f"repulsion of {contact.strength:g} at that distance, none at twice that",
+        "repel": f"repulsion of {strength(case):.4g} at that distance{default}, none at twice that",
     }
     return f"contact of axes nearer than {where}, looked for each step: {acts[contact.action]}"
 

@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from helpers.contact_scenes import GRID, case, crossed, ran
 
+from ibfil.assembly.contact import strength
+from ibfil.case.reading import parse_case
 from ibfil.check.report import absent, modelled
 from ibfil.check.warnings import warnings
 from ibfil.errors import CaseError
@@ -199,3 +202,18 @@ def test_a_box_too_small_for_nearest_images_is_refused():
     scene = case(crossed(0.2, 0.0), {"distance": 0.45}, GRID)
     with pytest.raises(CaseError, match=r"contact\.distance: found 0\.45; allowed: .* half of fluid\.box"):
         Simulation(scene)
+
+
+def test_the_default_strength_is_in_the_units_of_the_rods() -> None:
+    """10 A/L^2 of the filament that has the most: 1 in whatever units pushed soft rods a thousandfold too hard."""
+    for bending, length in ((1.0, 1.0), (2e-3, 1.0), (0.07, 10.0)):
+        rod = {"length": length, "nodes": 11, "bending": bending, "stretching": 1e3, "position": [0, 0, 0]}
+        other = {**rod, "bending": 0.1 * bending, "position": [0, 0, length]}
+        text = {
+            "filament": {"one": rod, "other": other},
+            "fluid": {"model": "rft", "viscosity": 1.0},
+            "contact": {"action": "repel", "distance": 0.05 * length},
+            "time": {"end": 1.0},
+            "output": {"every": 1.0},
+        }
+        assert strength(parse_case(tomli_w.dumps(text), "test.toml")) == pytest.approx(10 * bending / length**2)
