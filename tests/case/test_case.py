@@ -94,7 +94,7 @@ def test_defaults_of_the_shortest_case():
         "linear",
     )
     assert (short.contact, short.thermal, short.stops, short.observe) == (None, None, (), {})
-    assert (short.fluid.drag, short.fluid.kernel, short.fluid.slip) == ("paper", "peskin4", 0.01)
+    assert (short.fluid.drag, short.fluid.kernel, short.fluid.slip) == ("auto", "peskin4", 0.01)
     assert (short.time.step, short.time.scheme, short.time.order) == ("auto", "implicit", 2)
     assert (short.compute.threads, short.output.checkpoint_every) == (1, 60.0)
 

@@ -23,7 +23,7 @@ def case(rods: dict[str, Any], contact: dict[str, Any] | None, fluid=None, every
     text = {
         "filament": {name: {**ROD, **rod} for name, rod in rods.items()},
         **({} if contact is None else {"contact": contact}),
-        "fluid": {"model": "rft", "viscosity": 1.0, **(fluid or {})},
+        "fluid": {"model": "rft", "drag": "paper", "viscosity": 1.0, **(fluid or {})},
         "time": {"end": 1.0, "step": 0.01, **time},
         "output": {"every": every},
     }

@@ -172,8 +172,9 @@ def test_a_thickness_makes_no_sheet():
 )
 def test_what_leaves_the_plane_is_told(changes, said):
     told = [line for line in warnings(Simulation(parse_case(CASE, "s.toml", changes))) if "net force" not in line]
-    assert len(told) == bool(said), told
-    assert all(line.startswith(said) for line in told), told
+    assert bool(told) == bool(said), told
+    # A flow along z pushes the rod there too, within the first step.
+    assert any(line.startswith(said) for line in told) == bool(said), told
 
 
 def test_check_says_that_it_is_a_sheet():

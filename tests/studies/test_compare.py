@@ -51,7 +51,7 @@ def test_every_fluid_of_the_schema_can_be_asked_for():
     assert fluid_overrides("matched", case) == ("fluid.model=rft", "fluid.drag={matched=1.0}")
     own = parse_case(SWIMMER, "s", ["fluid.drag={matched=2.0}"])
     assert fluid_overrides("matched", own) == ("fluid.model=rft",)
-    assert fluid_overrides("rft", own) == ("fluid.model=rft", "fluid.drag=paper")
+    assert fluid_overrides("rft", own) == ("fluid.model=rft", "fluid.drag=auto")
     assert fluid_overrides("rft", case) == ("fluid.model=rft",)
 
 

@@ -96,11 +96,12 @@ def test_the_error_is_the_tolerance_within_a_factor_of_three(rod, end, tolerance
         assert 1 / 3 < ratio < 3, f"tolerance {tolerance:g}: {ratio:.2g} of it"
 
 
-def test_explicit_steps_follow_a_tolerance():
+def test_explicit_steps_follow_a_tolerance(monkeypatch):
     """By first order as long as it asks for less than the limit of stability.
 
     Above that limit errors grow until a step is not taken, so that some half of it is the most on average.
     """
+    monkeypatch.setattr("ibfil.shapes.initial.at_rest", lambda filament: False)  # nodes of the curve, far from rest
     bent = SWIMMER.replace("nodes = 41", "nodes = 21").replace("1.6e4", "400")
     end, explicit, steps = 5e-4, "scheme = 'explicit'\n", []
     fine, _ = _path(bent, end, "tolerance = 1e-4")
@@ -122,7 +123,7 @@ def test_the_shortest_step_is_in_the_units_of_the_case():
         simulation = Simulation(case)
         simulation.advance(case.time.end, lambda: None)
         steps.append(simulation.steps)
-    assert steps[0] == pytest.approx(steps[1], rel=0.2)
+    assert steps[0] == pytest.approx(steps[1], rel=0.3)  # they begin at rest, to other last digits
     assert 5 < steps[0] < 200
 
 
@@ -203,6 +204,7 @@ def _in_a_heavy_fluid(tolerance, end=0.6):
 
 def test_steps_are_held_so_that_a_fluid_with_inertia_keeps_its_operator(monkeypatch):
     """Each length costs it two tables: one for the step that changes to it, one for those that follow."""
+    monkeypatch.setattr("ibfil.shapes.initial.at_rest", lambda filament: False)  # nodes of the curve, far from rest
     made, octant = [], mobility_table.octant
     monkeypatch.setattr(mobility_table, "octant", lambda *given: made.append(1) or octant(*given))
     _, lengths = _in_a_heavy_fluid(1e-3)
