@@ -69,9 +69,10 @@ def _observed(run: RunFile, name: str, observable: Observable, found: Summary) -
     words = getattr(observable, "words", observable.description)
     return {
         "value": _plain(found.value),
+        "standard_error": None if found.error is None else _plain(found.error),
         "units": units,
         "description": words,
-        "note": found.note,
+        "note": found.note or found.doubt,
         "quality": found.quality,
     }
 
@@ -79,7 +80,8 @@ def _observed(run: RunFile, name: str, observable: Observable, found: Summary) -
 def _last(run: RunFile, name: str) -> dict[str, Any]:
     """The last value of an observable that was added from Python."""
     path, last = f"observables/{name}", _plain(run.observables[name][-1])
-    return {"value": last, "units": run.units(path), "description": run.description(path), "note": "", "quality": ""}
+    known = {"units": run.units(path), "description": run.description(path), "note": "", "quality": ""}
+    return {"value": last, "standard_error": None, **known}
 
 
 def _plain(value: float | np.ndarray) -> float | list[float | None] | None:
@@ -133,8 +135,7 @@ def as_text(told: Mapping[str, Any]) -> str:
 def results(told: Mapping[str, Any], changes: str = "") -> str:
     """The observables and what was expected of them, of the case without ``changes``, as `ibfil run` ends with."""
     rows = [
-        (name, "=", _number(found["value"]), found["units"], _words(found))
-        for name, found in told["observables"].items()
+        (name, "=", _with_error(found), found["units"], _words(found)) for name, found in told["observables"].items()
     ]
     lines = ["observables", *_unit_rows(rows)] if rows else ["no observables in this case"]
     if told["expected"]:
@@ -182,6 +183,14 @@ def _number(value: float | list[float | None] | None) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(_number, value)) + "]"
     return "none" if value is None else f"{value:.6g}"
+
+
+def _with_error(found: Mapping[str, Any]) -> str:
+    """A number, and its standard error where it has one."""
+    if found["standard_error"] is None:
+        return _number(found["value"])
+    errors = [None if value is None else float(f"{value:.2g}") for value in np.atleast_1d(found["standard_error"])]
+    return f"{_number(found['value'])} +- {_number(errors if isinstance(found['value'], list) else errors[0])}"
 
 
 def duration(seconds: float) -> str:

@@ -23,6 +23,8 @@ _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums ove
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
 _ELEMENT = 1.0e-5  # an element of a link for its force and stiffness
 _ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
+_THERMAL = 1.8  # of a semi-implicit step of the rods, one with thermal forces: a second force, a second solve
+_NORMAL = 1.6e-8  # a normal number
 _PRODUCTS = 11  # of GMRES with a preconditioner rod by rod, an iteration of Newton
 _LARGEST = 2.0**30  # bytes that the table's dense matrices may take before the table is out of the question
 
@@ -61,6 +63,8 @@ def factored(nodes: int, parts: int = 3) -> float:
 
 def of_rods(case: Case, nodes: int, scheme: str = "") -> float:
     """Seconds a step takes for the rods alone, in the case's scheme or another."""
+    if case.thermal is not None and not scheme:
+        return _THERMAL * nodes * _NODE
     return _ROUNDS[scheme or case.time.scheme] * nodes * _NODE
 
 
@@ -88,25 +92,26 @@ def seconds_a_step(
     bounding box in cells, ``parts`` how many numbers of a node go through the grid (4: torques too). The table is out
     where it does not fit.
     """
-    nodes = sum(rods)
+    nodes, number = sum(rods), float(np.prod(cells))
     local = of_rods(case, nodes)
     whole = (parts - 2) * (full_evaluation(cells) + nodes * SPREAD)
     if case.fluid.inertial:
-        return _by_method(case, rods, parts, local + of_inertia(cells, parts), {"fft": whole})
+        return _by_method(case, rods, parts, local + of_inertia(cells, parts), {"fft": whole}, number)
     if parts == 4:
-        return _by_method(case, rods, parts, local, {"fft": whole})
+        return _by_method(case, rods, parts, local, {"fft": whole}, number)
     pruned = pruned_evaluation(cells, sizes) + nodes * SPREAD
-    return _by_method(case, rods, parts, local, {"fft": whole, "pruned": pruned})
+    return _by_method(case, rods, parts, local, {"fft": whole, "pruned": pruned}, number)
 
 
-def of_methods(
-    case: Case, rods: Sequence[int], parts: int, evaluations: dict[str, float], pair: float = 1.0
-) -> dict[str, float]:
-    """The same of a fluid without a history, given the seconds of an evaluation by each kind of transforms.
+def without_box(case: Case, rods: Sequence[int], parts: int, whole: float, pair: float = 1.0) -> dict[str, float]:
+    """The same in free space, ``whole`` the seconds of an evaluation by transforms, of which noise has no root.
 
     ``pair`` is what a pair of nodes costs, over what it does in the periodic table.
     """
-    return _by_method(case, rods, parts, of_rods(case, sum(rods)), evaluations, pair)
+    found = _by_method(case, rods, parts, of_rods(case, sum(rods)), {"fft": whole}, 0.0, pair)
+    if case.thermal is not None:
+        del found["krylov"]
+    return found
 
 
 def _table(nodes: int, parts: int) -> float:
@@ -115,11 +120,17 @@ def _table(nodes: int, parts: int) -> float:
 
 
 def _by_method(
-    case: Case, rods: Sequence[int], parts: int, local: float, evaluations: dict[str, float], pair: float = 1.0
+    case: Case,
+    rods: Sequence[int],
+    parts: int,
+    local: float,
+    evaluations: dict[str, float],
+    cells: float,
+    pair: float = 1.0,
 ) -> dict[str, float]:
     """Seconds by the table, by the transforms of ``evaluations`` (seconds of one each), and by Krylov on the cheapest.
 
-    ``local`` is what a step takes whatever answers to the forces.
+    ``local`` is what a step takes whatever answers to the forces, ``cells`` the number of all.
     """
     rounds, nodes, cheapest = _ROUNDS[case.time.scheme], sum(rods), min(evaluations.values())
     build = pair * _table(nodes, parts)
@@ -130,7 +141,20 @@ def _by_method(
     exact = local + build + rounds * solved(nodes, parts) if dense_bytes(nodes, parts) < _LARGEST else np.inf
     made = sum(pair * _table(k, parts) + solved(k, parts) for k in rods)
     by_transforms = {name: exact + 4 * rounds * one for name, one in evaluations.items()}
-    return {"table": exact, **by_transforms, "krylov": local + _PRODUCTS * rounds * cheapest + made}
+    found = {"table": exact, **by_transforms, "krylov": local + _PRODUCTS * rounds * cheapest + made}
+    if case.thermal is None:
+        return found
+    # The matrix where the drift looks, and the root; by transforms four velocities for the drift, and the correction.
+    dense, more = build + _root(nodes, parts), 4 * cheapest + 4 * rounds * cheapest
+    root = 0.5 * max(evaluations.values()) + 3 * _NORMAL * cells
+    extra = {"table": dense, "krylov": more + _PRODUCTS * rounds * cheapest + root}
+    return {name: seconds + extra.get(name, dense + more) for name, seconds in found.items()}
+
+
+def _root(nodes: int, parts: int) -> float:
+    """Seconds of the Cholesky factor of the matrix of all nodes."""
+    n = float(parts) * nodes
+    return (0.35 * n + 50.0) * n**2 * _FLOP
 
 
 def dense_bytes(nodes: int, parts: int = 3) -> float:

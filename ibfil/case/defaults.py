@@ -44,5 +44,5 @@ def fill_defaults(filled: dict[str, Any], parameters: Parameters) -> None:
         if len(filaments) == 1 and "link" not in table("observe", name):
             table("observe", name).setdefault("filament", next(iter(filaments)))
     for name in table("expect"):
-        if "value" in table("expect", name) and "absolute" not in table("expect", name):
+        if "value" in table("expect", name) and not {"absolute", "standard_errors"} & set(table("expect", name)):
             table("expect", name).setdefault("tolerance", 0.01)

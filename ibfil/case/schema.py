@@ -131,6 +131,9 @@ class Observe(Table):
         "circularity",
         "growth",
         "frequency",
+        "diffusion",
+        "diffusion_along",
+        "diffusion_across",
         "diffusion_ratio",
         "stretch",
         "twist",
@@ -163,7 +166,7 @@ class Observe(Table):
     along: Vector | None = Field(None, description="component or axis, where the kind has one")
     space: Literal["none", "mean", "max", "min"] = Field("none", description="over the window")
     over: Range | None = Field(None, description="time window; absent: the whole run")
-    interval: NotNegative = Field(0.0, description="diffusion_ratio: the lag")
+    interval: NotNegative = Field(0.0, description="diffusion: the lag")
     summary: Literal["last", "mean", "max", "min", "median"] = Field(
         "last", description="over `over`: the number in the summary and in [expect]"
     )
@@ -206,6 +209,9 @@ class Expect(Table):
     range: Range | None = Field(None, description="or the range [lo, hi] it must lie in")
     tolerance: NotNegative | None = Field(None, description="relative error allowed; 0.01 by default with value")
     absolute: NotNegative | None = Field(None, description="or the absolute error allowed")
+    standard_errors: Positive | None = Field(
+        None, description="or how many standard errors, of a mean of a thermal run; a tolerance then bounds these"
+    )
     source: str = Field("", description="where the number comes from")
     quick: dict[str, object] = Field(
         {},
@@ -253,7 +259,7 @@ class Scene(Table):
     links: dict[str, Link] = Field({}, alias="link", description="one table a link between filaments")
     contact: Contact | None = Field(None, description="absent: not looked for")
     fluid: Fluid = Field(description="the fluid", examples=[{"model": "rft", "viscosity": 1.0}])
-    thermal: Thermal | None = Field(None, description="thermal noise, rft only")
+    thermal: Thermal | None = Field(None, description="thermal noise, in rft and in stokes")
     time: Time = Field(description="how far, by which steps", examples=[{"end": 1.0}])
     stops: Annotated[tuple[Stop, ...], Listed()] = Field((), alias="stop", description="reasons to end early")
     observe: dict[str, Observe] = Field({}, description="numbers taken at every output")

@@ -13,6 +13,7 @@ from ..case.shape import RunShape
 from ..case.table import expressions
 from ..shapes import initial
 from ..simulation import steps
+from ..simulation.thermal_step import MOVE, RINGING, TURN, KickSizes, sizes_of_step
 from .dimensionless import of_filament, oscillations
 
 if TYPE_CHECKING:
@@ -22,12 +23,12 @@ if TYPE_CHECKING:
 
 
 SLOWED, DAMPED = 0.02, 0.2  # by which steps may change omega, and the decay, of a rod's own oscillation
-FLUCTUATION = 0.05  # mean square of a thermal stretch, or angle between nodes, that is still small
+FLUCTUATION = 0.05  # mean square of a thermal angle between nodes that is still small
 QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
 JUMP = 1e-6  # of the larger value: a difference between the ends of a closed rod that is none
 STRAINED = 1e-6  # of the length of a filament: strain of a link at the start that is none
 STIFF = 1e6  # stiffness of a link times the step over the drag of a node: beyond it Krylov's forces drift
-THERMAL_STRETCH = 2e-3  # mean stretch that thermal kicks leave in a step: as wrong a length is small
+RINGS, EXPLODES = 0.1, 0.3  # kT a node in ringing motions: variances are off by so much; runs explode sooner or later
 
 
 def warnings(simulation: Simulation) -> list[str]:
@@ -145,22 +146,16 @@ def _of_noise(simulation: Simulation) -> list[str]:
 
 
 def _softness(key: str, filament, energy: float) -> list[str]:
-    """Where a segment's own fluctuations are not small: <strain^2> = kT/(EA ds), <angle^2> = kT ds/A between two."""
+    """Where the angles between neighbours are not small: <angle^2> = kT ds/A."""
     out, ds = [], filament.length / (filament.nodes - 1)
     s = np.linspace(0.0, filament.length, filament.nodes)
 
-    def square(modulus, size: float) -> float:
-        return energy * size / float(np.min(modulus.bind("s", "t")(s, 0.0)))
+    def square(modulus) -> float:
+        return energy * ds / float(np.min(modulus.bind("s", "t")(s, 0.0)))
 
-    stretched = square(filament.stretching, 1 / ds)
-    if stretched > FLUCTUATION:
-        out.append(
-            f"{key}.stretching: segments fluctuate by {np.sqrt(stretched):.2g} of their length (rms): "
-            "take a larger one, or fewer nodes"
-        )
-    turned = {"bending": max(square(modulus, ds) for modulus in filament.bending)}
+    turned = {"bending": max(square(modulus) for modulus in filament.bending)}
     if filament.twisting is not None:
-        turned["twisting"] = square(filament.twisting, ds)
+        turned["twisting"] = square(filament.twisting)
     for kind, value in turned.items():
         if value > FLUCTUATION:
             enough = 1 + int(np.ceil((filament.nodes - 1) * value / FLUCTUATION))
@@ -177,23 +172,60 @@ def _softness(key: str, filament, energy: float) -> list[str]:
 
 
 def _of_noisy_step(simulation: Simulation) -> list[str]:
-    case, dt = simulation.case, simulation.step_length
-    out: list[str] = []
+    case, out = simulation.case, []
     assert case.thermal is not None
-    stretch = simulation.thermal_stretch(dt)
-    if stretch > THERMAL_STRETCH:
-        out.append(
-            f"time.step: thermal kicks turn segments so far in a step that they stay {100 * stretch:.2g} % longer; "
-            "take a shorter one"
-        )
-    memory = dt**2 / (2 * simulation.explicit_limit())
-    if memory > max(0.1 * case.time.end, dt):
-        out.append(
-            f"time.step: with it the stiffest motions reach their thermal spread only in {memory:.2g}; "
-            "take a shorter one, or start from a shape that has it"
-        )
+    kicks = sizes_of_step(simulation.model, simulation.step_length)
+    out += _of_kicks(kicks) + _of_repulsion(simulation, kicks)
     if case.thermal.planar and np.max(np.abs(simulation.start.e3[:, 2])) > 1e-9:
         out.append('thermal.directions: "xy" is meant for rods in a plane z = const, and these leave it')
+    return out
+
+
+def _of_kicks(kicks: KickSizes) -> list[str]:
+    """The faults of a given step: kicks that turn segments too far, make stiff motions ring, or jump over cells."""
+    out, advice = [], 'take a shorter one, or "auto"'
+    angle = f"{np.sqrt(4 * kicks.turn):.2g} rad (rms) in a step"
+    key = f"time.step: thermal kicks turn segments of filament {kicks.filament} by {angle}"
+    if kicks.ringing > RINGS:
+        fate = "the run is likely to explode"
+        if kicks.ringing <= EXPLODES:
+            fate = f"these have some {100 * kicks.ringing:.0f} % less than their thermal variance"
+        out.append(
+            f"{key}, and what is not linear in that makes its stiff motions ring with {kicks.ringing:.2g} kT a node "
+            f"(automatic steps: {RINGING:g}): {fate}; {advice}"
+        )
+    if kicks.turn > 2 * TURN:
+        out.append(
+            f"{key}: a linear step would leave them {100 * kicks.turn:.2g} % longer, and its correction takes most of "
+            f"that off, but not all; {advice}"
+        )
+    if kicks.kick > 1.1 * MOVE * kicks.cell:
+        enough = kicks.dt * (MOVE * kicks.cell / kicks.kick) ** 2
+        cells = f"{kicks.kick / kicks.cell:.2g} cells (rms) a step"
+        out.append(f"time.step: thermal kicks push nodes by {cells}: take one below {enough:.2g}")
+    return out
+
+
+def _of_repulsion(simulation: Simulation, kicks: KickSizes) -> list[str]:
+    """The faults of thermal steps in which segments may jump over what keeps them apart, or are thrown back."""
+    repulsion = simulation.rods.contact.repulsion
+    if repulsion is None:
+        return []
+    (strength, distance), out = repulsion, []
+    if np.sqrt(3) * kicks.move > 0.25 * distance:
+        enough = kicks.dt * (0.25 * distance / kicks.move) ** 2 / 3
+        out.append(
+            f"time.step: rods move by {np.sqrt(3) * kicks.move:.2g} (rms) a step, above a quarter of the distance over "
+            f"which they repel each other, {distance:.2g}: take one below {enough:.2g}"
+        )
+    assert simulation.case.thermal is not None
+    thrown = strength / distance * kicks.kick**2 / (2 * simulation.case.thermal.energy)
+    if thrown > 1:
+        out.append(
+            f"contact.strength: in a step {strength:.2g} over {distance:.2g} throws a node back {thrown:.2g} times as "
+            f"far as it came: take a time.step below {kicks.dt / thrown:.2g}, or a strength below "
+            f"{strength / thrown:.2g}"
+        )
     return out
 
 

@@ -10,6 +10,8 @@ about the tangent. All first and second order schemes are one statement,
     y = target + tau (u0 + M (f(y) + R)),       y = prescribed at held unknowns, where the reaction R acts
 
 so held nodes are data, and the reaction on a support comes out of the solve.
+
+Thermal forces ask for one thing more: a random motion whose covariance is M itself (timestepping/brownian.py).
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..linalg.constraints import Prescribed
+from ..linalg.normal_numbers import Draw
 from ..linalg.stiffness import Stiffness
 
 Flow = Callable[[np.ndarray, float], np.ndarray]  # places (k, 3) and a time -> background velocity (k, 3)
@@ -56,6 +59,12 @@ class Response(Protocol):
         self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K = ``stiffness``."""
+
+    def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
+        """A random motion of mean zero and covariance M, of that shape (n, m), of all nodes as if none were held.
+
+        Raises StepFailed where M has no root.
+        """
 
 
 class Fluid(Protocol):

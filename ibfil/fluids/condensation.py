@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
+from ..linalg.normal_numbers import Draw, Purpose
 from ..linalg.stiffness import Pairs, Stiffness, no_pairs, nodes_of
 
 Solve = Callable[[np.ndarray], np.ndarray]  # right sides (k,) or (k, l) -> the solution
@@ -160,6 +161,9 @@ class Condensation(Protocol):
     ) -> np.ndarray:
         """Reactions (n, m) of supports that hold what does not go through the fluid."""
 
+    def fluctuate_rest(self, motion: np.ndarray, draw: Draw) -> None:
+        """Writes random motions of what does not go through the fluid into ``motion`` (n, m) (base.py)."""
+
 
 class _Whole:
     """Everything goes through the fluid."""
@@ -200,6 +204,9 @@ class NothingCondensed:
     ) -> np.ndarray:
         """None."""
         return np.zeros(felt.shape)
+
+    def fluctuate_rest(self, motion: np.ndarray, draw: Draw) -> None:
+        """Nothing is left to do."""
 
 
 class _Condensed:
@@ -275,3 +282,7 @@ class TwistCondensed:
         at = held.at[held.at % 4 == 3] // 4
         out[at, 3] = (self._drag * (y[:, 3] - target[:, 3]) / tau - felt[:, 3])[at]
         return out
+
+    def fluctuate_rest(self, motion: np.ndarray, draw: Draw) -> None:
+        """Turns, each against its own drag."""
+        motion[:, 3] = draw(Purpose.TURN, (len(motion),)) / np.sqrt(self._drag)

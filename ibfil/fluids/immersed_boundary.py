@@ -20,10 +20,12 @@ import numpy as np
 from ..grid.kernels import Kernel
 from ..grid.spreading import Stencil
 from ..linalg.constraints import Prescribed
+from ..linalg.normal_numbers import Draw
 from ..linalg.stiffness import Stiffness
 from .base import Flow, Solution
 from .condensation import Condensation, Group, Newton, NothingCondensed, Reduced, TwistCondensed
 from .coupling import TRANSLATION, Coupling, Nodes
+from .roots import Root
 from .spaces.base import Mobility, Space
 from .velocity_gradient import advected
 
@@ -111,6 +113,11 @@ class ImmersedResponse(ABC):
     def columns(self, index: np.ndarray) -> np.ndarray:
         """Columns (c n, k) of the mobility at flat indices (k,)."""
 
+    @property
+    @abstractmethod
+    def root(self) -> Root:
+        """The root of the mobility."""
+
     @abstractmethod
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         """x (c n,) with (1 - tau M K) x = right; at held unknowns columns of -tau M: forces are sought."""
@@ -160,3 +167,10 @@ class ImmersedResponse(ABC):
         felt = force + stiffness.times(move)
         reaction += condensation.react_rest(y + move, base, felt, held, self.tau)
         return Solution(move, felt + reaction, reaction)
+
+    def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
+        """A random motion of mean zero and covariance M (base.py). Raises NoRoot."""
+        motion = np.zeros(shape)
+        motion[:, : self.components] = self.root.motion(self.nodes, draw)
+        self.immersed.condensation.fluctuate_rest(motion, draw)
+        return motion

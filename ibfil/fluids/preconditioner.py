@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -136,16 +137,22 @@ class WholeMatrix:
 
     keeps = True
 
-    def __init__(self, matrix: Matrix) -> None:
-        self._matrix = matrix
+    def __init__(self, matrix: Matrix, nodes: Nodes) -> None:
+        self._matrix, self._nodes = matrix, nodes
         self._known: tuple[Stiffness, Blocks] | None = None  # the stiffness, and the factors
+
+    @cached_property
+    def mobility(self) -> np.ndarray:
+        """The matrix (c n, c n)."""
+        return self._matrix.of(self._nodes, self._matrix.own)
 
     def solve(self, asked: Asked, right: np.ndarray) -> np.ndarray:
         """By an iteration or two."""
         rods = asked.statement.frozen()
         if self._known is None or self._known[0] is not rods.stiffness:
-            whole = ((slice(0, len(asked.nodes.axes)),),)
-            self._known = rods.stiffness, self._matrix.factored(asked.nodes, asked.tau, rods, whole)
+            n = len(asked.nodes.axes)
+            system = rods.system((slice(0, n),), self.mobility, asked.tau)
+            self._known = rods.stiffness, gmres.factored([(np.arange(self._matrix.parts * n), system)], rods.held)
         return _checked(gmres.solve(asked.product, right, self._known[1], _EXACT, _MOST))
 
 

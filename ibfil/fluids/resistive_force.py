@@ -3,8 +3,7 @@
     Z_i = Lc [ zeta_perp (1 - e3 e3) + zeta_par e3 e3 ],   and Lc zeta_r for the spin:   Z (u - u0) = F
 
 u0 is the background flow, and half its curl about the tangent. M = Z^-1, so the implicit step is multiplied by Z and is
-as sparse as K: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f. A band where rods are alone; where nodes far apart are
-coupled, factors in an order of little fill (block_sparse.py).
+as sparse as K: (Z/tau - K) d = Z/tau (target - y) + Z u0 + f, a band unless far nodes are coupled (block_sparse.py).
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from numba import njit
 
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
+from ..linalg.normal_numbers import Draw, Purpose
 from ..linalg.stiffness import Pairs, Stiffness
 from ..linalg.vectors import at, dot, mix, put
 from .base import Flow, Memoryless, Solution
@@ -58,6 +58,20 @@ def mobilize(drag: Drag, e3, force):
         put(out, i, 0, mix(1.0 / drag.perp[i], f, (1.0 / drag.par[i] - 1.0 / drag.perp[i]) * dot(f, t), t))
         if m == 4:
             out[i, 3] = force[i, 3] / drag.spin[i]
+    return out
+
+
+@njit(cache=True)
+def random_motion(drag: Drag, e3, normal):
+    """Z^-1/2 w for normal numbers w (n, m)."""
+    n, m = normal.shape
+    out = np.empty((n, m))
+    for i in range(n):
+        t, w = at(e3, i, 0), at(normal, i, 0)
+        across = 1.0 / np.sqrt(drag.perp[i])
+        put(out, i, 0, mix(across, w, (1.0 / np.sqrt(drag.par[i]) - across) * dot(w, t), t))
+        if m == 4:
+            out[i, 3] = normal[i, 3] / np.sqrt(drag.spin[i])
     return out
 
 
@@ -172,6 +186,9 @@ class _Response:
         blocks = pairs.blocks * free[pairs.rows][:, :, None]
         d = self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))(right)
         return d, resist(self.drag, self.e3, (moved + d) * inverse)
+
+    def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
+        return random_motion(self.drag, self.e3, draw(Purpose.MOTION, shape))
 
 
 def _at(held: Prescribed, values: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -28,6 +29,7 @@ from .condensation import Reduced
 from .coupling import Nodes
 from .immersed_boundary import Immersed, ImmersedResponse
 from .preconditioner import Asked, Matrix, Preconditioner, RodByRod, WholeMatrix
+from .roots import DenseRoot, Root
 from .spaces.base import velocity_of
 
 
@@ -95,6 +97,10 @@ class _Dense(ImmersedResponse):
 
     def columns(self, index: np.ndarray) -> np.ndarray:
         return self.matrix[:, index]
+
+    @cached_property
+    def root(self) -> DenseRoot:
+        return DenseRoot(self.matrix)
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         rods = statement.frozen()
@@ -164,9 +170,10 @@ class _Fourier(ImmersedResponse):
         solver: Solver,
         block: Block,
         preconditioner: Preconditioner,
+        root: Callable[[], Root],
     ) -> None:
         super().__init__(immersed, nodes, flow, tau)
-        self._solver, self._block, self._preconditioner = solver, block, preconditioner
+        self._solver, self._block, self._preconditioner, self._make_root = solver, block, preconditioner, root
         self.keeps = preconditioner.keeps
 
     def apply(self, force: np.ndarray) -> np.ndarray:
@@ -179,6 +186,10 @@ class _Fourier(ImmersedResponse):
         held = np.unique(nodes)
         block = self._block(self.nodes, np.arange(len(self.nodes.axes)), held)
         return block[:, self.components * np.searchsorted(held, nodes) + components]
+
+    @cached_property
+    def root(self) -> Root:
+        return self._make_root()
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
         free, index = statement.free, statement.index
@@ -200,11 +211,19 @@ class StokesByFFT(Tabulated):
 
     def respond(self, nodes: Nodes, flow: np.ndarray | None, tau: float) -> _Fourier:
         """The FFT operator between nodes."""
-        return _Fourier(self.immersed, nodes, flow, tau, self.solver, self.block, self._preconditioner())
+        whole = WholeMatrix(self._exact(), nodes)
+        return self._by(nodes, flow, tau, whole, lambda: DenseRoot(whole.mobility))
 
-    def _preconditioner(self) -> Preconditioner:
-        """That of a new response."""
-        return WholeMatrix(self._exact())
+    def _by(
+        self,
+        nodes: Nodes,
+        flow: np.ndarray | None,
+        tau: float,
+        preconditioner: Preconditioner,
+        root: Callable[[], Root],
+    ) -> _Fourier:
+        """The FFT operator between nodes, with a preconditioner, and with a root that is made when it is asked for."""
+        return _Fourier(self.immersed, nodes, flow, tau, self.solver, self.block, preconditioner, root)
 
     def _exact(self) -> Matrix:
         """The exact matrices of nodes."""
@@ -214,16 +233,30 @@ class StokesByFFT(Tabulated):
 class StokesByKrylov(StokesByFFT):
     """IB Stokes for many nodes: GMRES on the FFT operator, preconditioned rod by rod, factors kept while they serve.
 
-    ``cost`` is what making them costs, in products.
+    ``cost`` is what making them costs, in products; ``root`` makes the root of the mobility, for thermal forces.
     """
 
-    def __init__(self, immersed: Immersed, solver: Solver, cost: float, alpha: float = 0.0) -> None:
+    def __init__(
+        self,
+        immersed: Immersed,
+        solver: Solver,
+        cost: float,
+        alpha: float = 0.0,
+        root: Callable[[], Root] | None = None,
+    ) -> None:
         super().__init__(immersed, solver, alpha)
         self.kept = RodByRod(self._exact(), immersed.groups, cost, couples_torque=immersed.coupling.grid_vectors > 1)
+        self._make_root = root
 
-    def _preconditioner(self) -> Preconditioner:
+    @cached_property
+    def _root(self) -> Root:
+        assert self._make_root is not None
+        return self._make_root()
+
+    def respond(self, nodes: Nodes, flow: np.ndarray | None, tau: float) -> _Fourier:
+        """The FFT operator between nodes."""
         self.kept.begin()
-        return self.kept
+        return self._by(nodes, flow, tau, self.kept, lambda: self._root)
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """The source of the kept factors; empty before there are any."""

@@ -73,6 +73,21 @@ def project(modes, kx, ky, kz, sx, sy, sz, alpha, viscosity, scale):
             modes[c, 0, 0, 1] = 0.0
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
+def project_root(modes, kx, ky, kz, sx, sy, sz, viscosity, scale):
+    """In place: scale (eta k^2)^-1/2 (1 - k k/|k|^2), with the mean mode zero; arguments as for ``project``."""
+    nx, ny, nz = modes.shape[1:]
+    for i in range(nx):
+        for j in range(ny):
+            a, b, s = kx[i], ky[j], sx[i] + sy[j]
+            d = a * a + b * b
+            for k in range(nz):
+                c, total = kz[k], viscosity * (s + sz[k])
+                f = scale / np.sqrt(total) if total != 0.0 else 0.0
+                u, v, w = solenoidal(modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k], a, b, c, d + c * c)
+                modes[0, i, j, k], modes[1, i, j, k], modes[2, i, j, k] = f * u, f * v, f * w
+
+
 @njit(cache=True)
 def half_curl(source, kx, ky, kz, target):
     """Adds 1/2 i k x ``source`` to ``target``, both modes (3, nx, ny, nz//2 + 1)."""

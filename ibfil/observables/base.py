@@ -14,6 +14,7 @@ import numpy as np
 
 from ..io.snapshots import Snapshot
 from . import time_series
+from .blocks import StandardError, means_of_blocks, standard_error
 
 if TYPE_CHECKING:
     from ..case.schema import Case, Observe
@@ -123,6 +124,7 @@ class ObservableBase:
                 allowed = f"nothing; {observe.kind} has {', '.join(self.keys)}"
                 raise Unfit(key, getattr(observe, key), allowed)
         self.filament = observe.filament
+        self.random = case.thermal is not None and case.thermal.energy > 0
         self.over, self._how, self.recorded = observe.over, observe.summary, observe.recorded
         along = observe.along or self.along
         self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
@@ -165,6 +167,14 @@ class ObservableBase:
     def quality(self, times: np.ndarray, samples: np.ndarray) -> str:
         """How well the summary fits the series, or why there is none; "" where nothing is fitted."""
         return ""
+
+    def error(self, times: np.ndarray, samples: np.ndarray) -> StandardError | None:
+        """The standard error of a mean over time, where the run is thermal; None where there is none."""
+        start, end = self.window(times)
+        if not self.random or self.fitted or _SUMMARIES[self._how].of is not time_series.mean or end <= start:
+            return None
+        inside = int(np.sum((times >= start) & (times <= end)))
+        return standard_error(means_of_blocks(times, samples), inside, start, end)
 
 
 KINDS: dict[str, type[ObservableBase]] = {}

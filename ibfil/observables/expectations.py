@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 class Check:
     """One expectation and what was found.
 
-    ``error`` is relative where the tolerance is, the distance from a range, NaN where there is no number.
+    ``error`` is relative where the tolerance is, absolute where standard errors decide, the distance from a range, NaN
+    where there is no number.
     """
 
     name: str
@@ -56,8 +57,31 @@ def _check(name: str, expect: Expect, summary: Summary) -> Check:
     else:
         found = summary.value
     error, allowed, expected = _judged(expect, found)
+    if expect.standard_errors is not None:
+        allowed, expected, doubt = _by_errors(expect, summary, allowed)
+        error, note = abs(found - float(expect.value or 0.0)), "; ".join(filter(None, (note, doubt)))
     passed = bool(error <= allowed) and not note
     return Check(name, expect.observe, expected, summary.value, error, passed, expect.source, note)
+
+
+def _by_errors(expect: Expect, summary: Summary, widest: float) -> tuple[float, str, str]:
+    """The distance allowed by standard errors, the same in words, and why it does not count; ``widest``: their most."""
+    assert expect.standard_errors is not None
+    assert expect.value is not None
+    times = f"{expect.standard_errors:g} standard errors"
+    if summary.error is None or isinstance(summary.error, np.ndarray):
+        return 0.0, f"{expect.value:.6g} +- {times}", "it has no standard error: a mean, drift or diffusion has one"
+    allowed = expect.standard_errors * summary.error
+    words = f"{expect.value:.6g} +- {allowed:.2g} ({times})"
+    if expect.tolerance is not None:
+        widest *= abs(expect.value) if expect.value else 1.0
+    if allowed > widest:
+        return (
+            allowed,
+            words,
+            f"{times} are {allowed:.2g}, above the {widest:.2g} that the case allows: run it for longer",
+        )
+    return allowed, words, summary.doubt
 
 
 def _judged(expect: Expect, found: float) -> tuple[float, float, str]:
@@ -71,7 +95,8 @@ def _judged(expect: Expect, found: float) -> tuple[float, float, str]:
         if expect.absolute is not None:
             allowed, words = expect.absolute, f"{expect.value:.6g} +- {expect.absolute:.6g}"
         else:
-            assert expect.tolerance is not None  # filled in by parse_case
-            allowed, words = expect.tolerance, f"{expect.value:.6g} +- {100 * expect.tolerance:.3g} %"
+            # Filled in by parse_case, but where standard errors decide: no bound then.
+            allowed = np.inf if expect.tolerance is None else expect.tolerance
+            words = f"{expect.value:.6g} +- {100 * allowed:.3g} %"
             error = error / abs(expect.value) if expect.value else error
     return (error if np.isfinite(found) else float("nan")), allowed, words

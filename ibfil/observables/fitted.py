@@ -5,14 +5,14 @@ A fit's series in the run file is what it is fitted to. A ratio's series is the 
 
 from __future__ import annotations
 
-from collections import deque
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ..io.snapshots import Snapshot
 from . import time_series
-from .base import Unfit, Value, plain
+from .base import Value, plain
+from .blocks import StandardError, rates_of_blocks, standard_error
 from .local import Amplitude, AtPlace, Component, OfFilament
 from .location import Location
 
@@ -45,6 +45,14 @@ class Drift(Component, kind="drift"):
             return plain(np.full(samples.shape[1:], np.nan))
         moved = time_series.at_time(times, samples, end) - time_series.at_time(times, samples, start)
         return plain(moved / (end - start))
+
+    def error(self, times: np.ndarray, samples: np.ndarray) -> StandardError | None:
+        """From the drifts over blocks."""
+        start, end = self.window(times)
+        if not self.random or end <= start:
+            return None
+        inside = (times >= start) & (times <= end)
+        return standard_error(rates_of_blocks(times, samples), int(np.sum(inside)), start, end)
 
 
 class Growth(Amplitude, kind="growth"):
@@ -142,52 +150,6 @@ class Frequency(AcrossAxis, kind="frequency"):
     def quality(self, times: np.ndarray, samples: np.ndarray) -> str:
         """How well the rate fits, or why there is none."""
         return time_series.angular_rate(*self.seen(times, samples)).quality
-
-
-class DiffusionRatio(AtPlace, kind="diffusion_ratio"):
-    """D_perp/D_par of a place (default the centroid): across and along the axis as each interval begins.
-
-    From mean squares of displacements over `interval`, an interval from every output in
-    `over`. The axis belongs to the most distinct eigenvalue of the gyration tensor: a rod's or helix's long
-    axis, a ring's normal.
-    """
-
-    keys = ("at", "space", "interval", "over")
-    mean_only = True
-    description = "diffusion across over along the gyration axis, so far,"
-    number = "diffusion across over along the gyration axis"
-
-    def __init__(self, case: Case, observe: Observe) -> None:
-        super().__init__(case, observe)
-        self.lag, every = observe.interval, case.output.every
-        if every and abs(self.lag / every - max(round(self.lag / every), 1)) > 1e-6:
-            raise Unfit("interval", self.lag, f"a multiple of output.every = {every:g}")
-        self._past: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
-        self._along = self._across = 0.0
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """Return the ratio of all intervals that have ended."""
-        position, time, past = self.look(snapshot).position, snapshot.time, self._past
-        begin, slack = time - self.lag, 1e-6 * self.lag
-        while past and past[0][0] < begin - slack:
-            past.popleft()
-        here = self.point(position)
-        if past and past[0][0] <= begin + slack and self._counts(past[0][0], time):
-            _, before, axis = past[0]
-            moved = here - before
-            self._along += (moved @ axis) ** 2
-            self._across += 0.5 * (moved @ moved - (moved @ axis) ** 2)
-        past.append((time, here, self._gyration_axis(position)))
-        return self._across / self._along if self._along > 0 else float("nan")
-
-    def _counts(self, start: float, end: float) -> bool:
-        slack = 1e-9 * abs(end)
-        return self.over is None or (start >= self.over[0] - slack and end <= self.over[1] + slack)
-
-    def _gyration_axis(self, position: np.ndarray) -> np.ndarray:
-        d = position - self.share @ position
-        squares, axes = np.linalg.eigh((d * self.share[:, None]).T @ d)
-        return axes[:, 2] if squares[2] - squares[1] >= squares[1] - squares[0] else axes[:, 0]
 
 
 class Efficiency(OfFilament, kind="efficiency"):

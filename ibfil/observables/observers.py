@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..io.snapshots import Snapshot
-from .base import Observable, Value, _shown
+from .base import Observable, Value, _shown, plain
 
 if TYPE_CHECKING:
     pass
@@ -17,14 +17,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Summary:
-    """The number of one observable; ``note`` is not empty where it does not cover all that was asked for.
+    """The number of one observable, and where it is a mean of a thermal run its standard error.
 
+    ``note`` is not empty where it does not cover all that was asked for; ``doubt`` where its error is not well known.
     ``quality`` tells of a number that is fitted how well it fits, or why there is none.
     """
 
     value: Value
     note: str = ""
     quality: str = ""
+    error: Value | None = None
+    doubt: str = ""
 
 
 class ObservableSet:
@@ -89,5 +92,15 @@ def summaries(
         if over is None or end >= over[0]:
             value = observable.summary(times, samples)
             quality = getattr(observable, "quality", _no_fit)(times, samples)
-        found[name] = Summary(value, note, quality)
+        found[name] = Summary(value, note, quality, *_error(observable, times, samples))
     return found
+
+
+def _error(observable: Observable, times: np.ndarray, samples: np.ndarray) -> tuple[Value | None, str]:
+    """The standard error of an observable that knows one, and what is doubtful about it."""
+    find = getattr(observable, "error", None)
+    found = find(times, samples) if find is not None and len(times) > 1 else None
+    if found is None:
+        return None, ""
+    doubt = "" if found.settled else "it stays correlated over much of its window: its standard error is uncertain"
+    return plain(found.value), doubt

@@ -57,6 +57,8 @@ class Ends(Protocol):
 class NoContact:
     """No contact: rods may pass through each other."""
 
+    repulsion = None
+
     def watch(self, before: np.ndarray, after: np.ndarray, start: float, end: float) -> str:
         """Nothing is looked for."""
         return ""

@@ -87,6 +87,11 @@ class Contact:
         self._clear = 0.0  # how much nearer two segments may come before there is anything to look for
         self.since = np.nan  # time of the first contact
 
+    @property
+    def repulsion(self) -> tuple[float, float] | None:
+        """The force of repulsion at contact and the distance over which it falls to zero; None where there is none."""
+        return None
+
     def near(self, r: np.ndarray, factor: float = 1.0, margin: float = 0.0) -> Pairs:
         """The pairs nearer than ``factor`` times their distance of contact and ``margin``, at nodes r (n, 3)."""
         return search(self.segments, r, self.box, factor, margin)
@@ -180,6 +185,11 @@ class ContactRepels(Contact):
         super().__init__(segments, names, offsets, box)
         self.strength = strength
         self._repulsion = Repulsion(segments, box, strength)
+
+    @property
+    def repulsion(self) -> tuple[float, float]:
+        """The strength, and the smallest distance of contact."""
+        return self.strength, self.nearest
 
     def watch(self, before: np.ndarray, after: np.ndarray, start: float, end: float) -> str:
         """Nothing to tell: they are kept apart."""

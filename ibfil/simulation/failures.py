@@ -48,7 +48,7 @@ class Step(NamedTuple):
         if self.dt > self.limit:
             return f"time.step below {self.limit:.3g}, or time.scheme=implicit"
         if self.kicked:
-            return "larger moduli where the warnings ask for them; a tenth of time.step; fewer nodes, each less kicked"
+            return 'a tenth of time.step, or "auto"; fewer nodes; what `ibfil check` says of the moduli'
         return otherwise
 
 

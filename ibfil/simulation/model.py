@@ -89,5 +89,5 @@ def assemble(case: Case, laws: Mapping[str, MomentLaw] = MappingProxyType({}), w
 
         fft.learn(wisdom)
     fluid, method = surrounding(described, rods), described.method(rods)
-    noise = scheme.noise(case, rods)
+    noise = scheme.noise(case, rods, described)
     return Model(case, rods, described, *fluid, method, noise, scheme.stepper(case, noise))

@@ -47,7 +47,7 @@ class Simulation:
         self.model = assemble(case, laws, wisdom)
         self._diagnostics = Diagnostics(self.model)
         self.state_now = State(0.0, self.start, np.zeros((len(self.arclength), self.system.unknowns)), 0.0)
-        self.steps = self._iterations = 0
+        self._iterations = 0
         self._turn = threading.RLock()
         self.notices: list[str] = []  # what has happened and nobody was told yet
         self._told = self._grown = False  # that the fluid moves too far in a step; that a disturbance grows too fast
@@ -88,6 +88,11 @@ class Simulation:
     def time(self) -> float:
         """Present time, in the case's unit."""
         return self.state_now.time
+
+    @property
+    def steps(self) -> int:
+        """The number of steps taken."""
+        return self.state_now.steps
 
     @property
     def configuration(self) -> Configuration:
@@ -217,7 +222,6 @@ class Simulation:
         self._look_at_crossing(time - before.time)
         self._look_at_growth(time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
-        self.steps += 1
         if self.steps > self.case.time.max_steps:
             limits = self.case.time
             self._fail(failures.too_many(self.steps, limits.max_steps, limits.end, time - before.time))
@@ -255,8 +259,7 @@ class Simulation:
 
     def _watch(self, before: State) -> None:
         """Looks for a contact since ``before``, where the case has [contact]."""
-        now = self.state_now
-        told = self.rods.contact.watch(before.configuration.r, now.configuration.r, before.time, now.time)
+        told = self.rods.contact.watch(before.configuration.r, self.configuration.r, before.time, self.time)
         self.notices += [told] if told else []
 
     def _fail(self, trouble: failures.Failure) -> None:
@@ -285,15 +288,8 @@ class Simulation:
         """Relaxation time of the slowest bending mode of any filament."""
         return timescales.slowest_bending(self.model)
 
-    def thermal_stretch(self, dt: float) -> float:
-        """How much longer than at rest thermal kicks leave a filament on average in steps of dt; the most of all."""
-        return timescales.stretch_by_kicks(self.model, dt)
-
     def explicit_limit(self) -> float:
-        """The largest stable step of the explicit scheme at the present configuration, 2/rho(M K).
-
-        Of the fluid inside: what nodes feel of their own velocity slows them, so this errs on the safe side.
-        """
+        """The largest stable step of the explicit scheme now, 2/rho(M K), or less where nodes feel their velocity."""
         return explicit_limit(self.system, self.model.inner, self.configuration, self.time)
 
     # -- what is looked at ---------------------------------------------------------------------------------------
@@ -348,7 +344,6 @@ class Simulation:
             **{f"limits_{key}": value for key, value in self.limits.state().items()},
             **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
             **{f"rods_{key}": value for key, value in self.system.memory().items()},
-            **({} if self.model.noise is None else {"random": self.model.noise.state()}),
             **self.rods.contact.state(),
             **({"laws": self._laws} if self._laws else {}),
         }
@@ -366,9 +361,9 @@ class Simulation:
         number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
         self._same_start(array["start"])
         configuration = Configuration(array["shape"])
-        self.state_now = State(number["time"], configuration, array["y_old"], number["dt_old"])
+        self.state_now = State(number["time"], configuration, array["y_old"], number["dt_old"], int(number["steps"]))
         self._last = (array["velocity"], array["force"], array["reaction"])
-        self.steps, self._iterations = int(number["steps"]), int(number["iterations"])
+        self._iterations = int(number["iterations"])
         known: dict[str, np.ndarray | float] = {**array, **number}
         control = {k.removeprefix("control_"): v for k, v in known.items() if k.startswith("control_")}
         self.notices += [] if self._control.restore(control) else [steps.OTHER_STEPS]
@@ -376,8 +371,6 @@ class Simulation:
         if memory := {k.removeprefix("fluid_"): v for k, v in known.items() if k.startswith("fluid_")}:
             self.fluid.recall(memory)
         self.system.recall({k.removeprefix("rods_"): v for k, v in known.items() if k.startswith("rods_")})
-        if self.model.noise is not None:
-            self.model.noise.restore(str(state["random"]))
         self.rods.contact.restore(known)
 
     def _same_start(self, began: np.ndarray) -> None:

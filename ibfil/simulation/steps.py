@@ -14,7 +14,7 @@ import numpy as np
 
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import AdaptiveStep, FixedStep, StepControl
-from . import timescales
+from . import thermal_step, timescales
 from .driving.breaks import Breaks
 from .driving.drivers import Drivers
 from .growth_watch import GrowthWatch, may_grow
@@ -29,7 +29,6 @@ GROWTH_BY_ERROR = 7  # the same of growth: a mode that grows by e in a step and 
 POINTS_GIVEN = 20  # the least that a given step is not warned of
 LONG_PHASE = 2 * np.pi / POINTS_GIVEN  # omega dt above which it is
 AUTOMATIC_ERROR = 1e-3  # of the length, over a run: of a step that grows as rods go to rest
-STRETCH = 1e-3  # what thermal kicks may leave of it with the automatic step
 _HALVINGS = 40
 OTHER_STEPS = (
     "time.step is auto, which looks at the whole run: with this time.end other steps would have been taken from the "
@@ -56,20 +55,31 @@ def choose(model: Model, drivers: Drivers) -> Choice:
         rate = 2 * np.pi / (POINTS_A_PERIOD * first)
         return Choice(AdaptiveStep(time.tolerance, rate, np.inf, time.order, system.length), reason, time.end, "error")
     if not time.automatic:
-        return Choice(FixedStep(float(time.step), growth), "given", float(time.step), "")
+        given = _ramped(model, float(time.step)) if _thermal(model) else FixedStep(float(time.step), growth)
+        return Choice(given, "given", float(time.step), "")
     if time.explicit:
         limit = explicit_limit(system, model.inner, model.rods.start, 0.0)
         return Choice(FixedStep(0.5 * limit, growth), "half the limit of the explicit scheme", 0.5 * limit, "")
-    if model.noise is not None:
-        first, reason = _thermal(model, *_shortest(model, drivers))
-        return Choice(FixedStep(first, growth), reason, first, "")
     first, reason = _shortest(model, drivers)
+    if _thermal(model):
+        longest = thermal_step.longest_step(model, first)
+        reason = reason if longest == first else "thermal kicks, which are to stay small"
+        return Choice(_ramped(model, longest), reason, longest, "")
     longest, pushed = _pushed(model, drivers)
     if drivers.repeating or longest <= first or model.mass is not None:
         return Choice(FixedStep(first, growth), reason, first, "")
     rate, error = 2 * np.pi / (POINTS_A_PERIOD * first), AUTOMATIC_ERROR / time.end
     control = AdaptiveStep(error, rate, min(longest, time.end), time.order, system.length, first)
     return Choice(control, reason, min(longest, time.end), pushed)
+
+
+def _thermal(model: Model) -> bool:
+    return model.noise is not None and model.noise.energy > 0
+
+
+def _ramped(model: Model, step: float) -> StepControl:
+    """Equal steps after short ones that double, so that the stiffest motions have their thermal spread at once."""
+    return FixedStep(step, 2.0, explicit_limit(model.rods.system, model.inner, model.rods.start, 0.0))
 
 
 def _pushed(model: Model, drivers: Drivers) -> tuple[float, str]:
@@ -96,22 +106,6 @@ def _shortest(model: Model, drivers: Drivers) -> tuple[float, str]:
         bounds.append((inertial / POINTS_A_PERIOD, "the time of the rods' inertia"))
     step, what = min(bounds)
     return step, f"a {POINTS_A_PERIOD}th of {what}"
-
-
-def _thermal(model: Model, step: float, reason: str) -> tuple[float, str]:
-    """The same with thermal kicks: the trapezoid forgets its stiffest mode in dt^2/(2 limit).
-
-    That is to be no later than the softest is forgotten.
-    """
-    limit, slowest = (
-        explicit_limit(model.rods.system, model.inner, model.rods.start, 0.0),
-        timescales.slowest_bending(model),
-    )
-    bounds = [(step, reason), (float(np.sqrt(2 * limit * slowest)), "the stiffest mode, which is to reach its spread")]
-    step, reason = min(bounds)
-    while timescales.stretch_by_kicks(model, step) > STRETCH:
-        step, reason = 0.9 * step, "the stretch that thermal kicks leave"
-    return step, reason
 
 
 def is_long(step: float, rate: float) -> bool:

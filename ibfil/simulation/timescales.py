@@ -115,24 +115,3 @@ def inertial_time(model: Model) -> float:
             roots = bending_roots(filament, drag)
             times.append(1.0 / abs(roots[0]) if roots[0].imag else mean_mass(filament) / drag)
     return float(min(times))
-
-
-def stretch_by_kicks(model: Model, dt: float) -> float:
-    """How much longer than at rest thermal kicks leave a filament on average in steps of dt; the most of all."""
-    assert model.case.thermal is not None
-    energy, drag = model.case.thermal.energy, model.fluid_model.drag
-    filaments = model.case.filaments.values()
-    return max(thermal_stretch(energy, drag(f), softest(f), f.length, f.nodes, dt) for f in filaments)
-
-
-def thermal_stretch(energy: float, drag: float, bending: float, length: float, nodes: int, dt: float) -> float:
-    """How much longer than at rest kicks of thermal energy leave a rod on average, in steps dt of the trapezoid.
-
-    A linear step turns a segment by an angle a and lengthens it by a^2/2; the next takes that back as much again, so
-    that half of it stands: a quarter of the mean of a^2. Modes q of the lattice, of rate lam = A q^4/zeta, move by
-    <dy^2> = 2 kT/(A q^4) lam dt/(1 + lam dt/2) in each of two directions. Zero as dt is.
-    """
-    spacing = length / (nodes - 1)
-    q = 2.0 * np.sin(0.5 * np.pi * np.arange(1, nodes) / (nodes - 1)) / spacing
-    rate = bending * q**4 / drag * dt
-    return float(energy / (bending * length) * np.sum(rate / (1.0 + 0.5 * rate) / q**2))

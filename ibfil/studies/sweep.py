@@ -12,28 +12,38 @@ from ..errors import CaseError
 from ..screen import tell
 from .member import Outcome
 from .members import run_members, work
+from .replicas import Mean, means
 from .settings import Axis, Setting, combinations
-from .tables import measured, numbers, refuse_strangers, study_members, write_csv, write_json
+from .tables import measured, numbers_with_errors, refuse_strangers, study_members, write_csv, write_json
 
-TABLE, DETAILS = "sweep.csv", "sweep.json"
+TABLE, DETAILS, MEANS = "sweep.csv", "sweep.json", "sweep_means.csv"
 
 
 @dataclass(frozen=True)
 class Swept:
-    """One combination, how its run ended, and its observables, empty where there is no result."""
+    """One combination, how its run ended, and its observables, empty where there is no result.
+
+    ``errors`` are their standard errors, of those that have one.
+    """
 
     setting: Setting
     outcome: Outcome
     numbers: dict[str, float]
+    errors: dict[str, float]
     about: dict[str, Any]  # steps, wall_time, method
 
     def row(self) -> dict[str, Any]:
         """Return its row of the table."""
+        found: dict[str, float] = {}
+        for name, value in self.numbers.items():
+            found[name] = value
+            if name in self.errors:
+                found[f"{name} +-"] = self.errors[name]
         return {
             "run": self.setting.name,
             **self.setting.values,
             "status": self.outcome.status,
-            **self.numbers,
+            **found,
             **self.about,
             "message": self.outcome.message,
         }
@@ -51,27 +61,39 @@ def sweep(
 ) -> list[Swept]:
     """Run every combination that is not done yet, and write ``folder``/sweep.csv and .json (with versions, machine).
 
-    ``case`` is a file, a shipped name or a text, ``overrides`` hold for all. Raises CaseError where the case or
-    all combinations are at fault, and Interrupted as `run_members`.
+    Thermal runs that differ in their seed alone are summed up in ``folder``/sweep_means.csv. ``case`` is a file, a
+    shipped name or a text, ``overrides`` hold for all. Raises CaseError where the case or all combinations are at
+    fault, and Interrupted as `run_members`.
     """
     settings = combinations(axes)
-    refuse_strangers(Path(folder), DETAILS, TABLE)
+    refuse_strangers(Path(folder), DETAILS, TABLE, MEANS)
     outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, log=log)
     rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
-    table = [row.row() for row in rows]
-    write_json(Path(folder) / DETAILS, {**measured(), "overrides": list(overrides), "runs": table})
+    table, summed = [row.row() for row in rows], [mean.row() for mean in means_over_seeds(rows)]
+    more = {"means": summed} if summed else {}
+    write_json(Path(folder) / DETAILS, {**measured(), "overrides": list(overrides), "runs": table, **more})
     write_csv(Path(folder) / TABLE, table)
+    if summed:
+        write_csv(Path(folder) / MEANS, summed)
     return rows
+
+
+def means_over_seeds(rows: Sequence[Swept]) -> list[Mean]:
+    """Means and standard errors over the runs that differ in the seed of their thermal forces alone; [] if none do."""
+    done = [row for row in rows if row.outcome.done]
+    return means([(row.outcome.member.resolved(), row.setting.values, row.numbers) for row in done])
 
 
 def _swept(setting: Setting, outcome: Outcome) -> Swept:
     from ..io.reader import RunFile
 
     if not outcome.done:
-        return Swept(setting, outcome, {}, {})
+        return Swept(setting, outcome, {}, {}, {})
     with RunFile(outcome.path) as run:
         about = {"steps": run.steps, "wall_time": run.wall_time, "method": run.method}
-        return Swept(setting, outcome, numbers(run), about)
+        found = numbers_with_errors(run)
+        errors = {name: error for name, (_, error) in found.items() if error is not None}
+        return Swept(setting, outcome, {name: value for name, (value, _) in found.items()}, errors, about)
 
 
 def listing(case: str, axes: Sequence[Axis], overrides: Sequence[str] = ()) -> list[str]:

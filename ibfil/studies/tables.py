@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..io.reader import RunFile
+    from ..observables.observers import Summary
 
 
 def study_members(case: str, overrides: Sequence[str], settings: Iterable[Setting]) -> list[Member]:
@@ -42,24 +43,37 @@ def study_members(case: str, overrides: Sequence[str], settings: Iterable[Settin
     raise CaseError(list(dict.fromkeys(faults)))
 
 
+def summaries_of(run: RunFile) -> dict[str, Summary]:
+    """The number of each observable of a run, with its standard error where it has one."""
+    from ..observables.factory import numbers_of
+
+    return numbers_of(run.case, run.time, run.observables)
+
+
 def observed(run: RunFile) -> dict[str, np.ndarray]:
     """The number () or vector (3,) of each observable of a run."""
     import numpy as np
 
-    from ..observables.factory import numbers_of
-
-    found = numbers_of(run.case, run.time, run.observables)
-    return {name: np.asarray(one.value, float) for name, one in found.items()}
+    return {name: np.asarray(one.value, float) for name, one in summaries_of(run).items()}
 
 
 def numbers(run: RunFile) -> dict[str, float]:
     """The same with a vector as NAME_x, NAME_y, NAME_z."""
-    out: dict[str, float] = {}
-    for name, value in observed(run).items():
-        if value.ndim:
-            out |= {f"{name}_{letter}": float(part) for letter, part in zip("xyz", value, strict=True)}
-        else:
-            out[name] = float(value)
+    return {key: value for key, (value, _) in numbers_with_errors(run).items()}
+
+
+def numbers_with_errors(run: RunFile) -> dict[str, tuple[float, float | None]]:
+    """The same, each with its standard error; None where it has none."""
+    import numpy as np
+
+    out: dict[str, tuple[float, float | None]] = {}
+    for name, one in summaries_of(run).items():
+        value = np.asarray(one.value, float)
+        error = [None] * 3 if one.error is None else np.atleast_1d(one.error).tolist()
+        keys = [f"{name}_{letter}" for letter in "xyz"] if value.ndim else [name]
+        out |= {
+            key: (float(part), error[i]) for i, (key, part) in enumerate(zip(keys, np.atleast_1d(value), strict=True))
+        }
     return out
 
 

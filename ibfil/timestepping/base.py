@@ -23,12 +23,13 @@ from ..rods.geometry import Configuration
 
 
 class State(NamedTuple):
-    """Where the rods are, and the step that led there (y_old (n, m) and dt_old; dt_old = 0 before the first)."""
+    """Where the rods are, the step that led there (y_old (n, m), dt_old; dt_old = 0 before the first), their number."""
 
     time: float
     configuration: Configuration
     y_old: np.ndarray
     dt_old: float
+    steps: int = 0
 
 
 class Step(NamedTuple):
@@ -108,5 +109,5 @@ def _finish(
     system: System, state: State, dt: float, y: np.ndarray, velocity: np.ndarray, answer: Solution, count: int, response
 ) -> Step:
     y = system.complete(y)
-    new = State(state.time + dt, system.move(state.configuration, y), y, dt)
+    new = State(state.time + dt, system.move(state.configuration, y), y, dt, state.steps + 1)
     return Step(new, system.complete(velocity), answer.force, answer.reaction, count, response)

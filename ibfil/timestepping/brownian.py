@@ -1,126 +1,133 @@
-"""Thermal forces in resistive-force theory (Sec. 7.4 and 7.5 of the paper), and the scheme that keeps their statistics.
+"""Thermal motion: over a step the fluid moves the nodes at random, with the covariance of its own mobility.
 
-Over a step the fluid kicks a node with an impulse of mean zero and covariance 2 kT dt Z (Eq. 53, which is right where
-Eq. 50-52 print 2 zeta kT/(ds dt): lambda^2 = 2 zeta kT), and turns it about the tangent by one of variance
-2 kT dt Lc zeta_r, with a normal number of its own (the paper's Sec. 7.5 prints none):
+    dy = [M f + kT div M] dt + sqrt(2 kT) M^1/2 dW              (Ito)
+    xi = sqrt(2 kT dt) M^1/2 w + dt kT div M                    the random motion of a step, held nodes as if free
 
-    Z = Lc [zeta_perp (1 - e3 e3) + zeta_par e3 e3],   Lc half a segment at an end; nothing on held unknowns
+M is taken where the step begins. The reactions that then hold nodes take from xi what they must, so that the others are
+left with the covariance of the mobility that is left to them (timestepping/README.md). In resistive-force theory
+M = Z^-1, and this is the paper's Eq. 53, impulses of covariance 2 kT dt Z (Eq. 50-52 print 2 zeta kT/(ds dt) where
+lambda^2 = 2 zeta kT is meant), with a normal number of its own for the twist (Sec. 7.5 prints none).
 
-Z turns with the rod, and is taken where the step begins. Boltzmann's law then asks for kT div Z^-1 (Ito), the force
-
-    (d - 1) kT (1 - zeta_par/zeta_perp) W1_ii/|r'| e3
-
-with W1_ii the weight of a node in its own tangent, and d = 3, or 2 in a plane. It is zero but at the ends, and where
-spacing is uneven; without it a free rod is under a compression of 1.5 kT/ds, the more the finer it is.
-
-Of a mode of rate lam, backward Euler leaves kT/k/(1 + lam dt/2), and BDF2 less; the trapezoid kT/k at every dt. Its
-price: it forgets the stiffest modes in lam dt/4 steps (timestepping/README.md).
+The drift kT div M is what Boltzmann's law asks for where M follows the rods, its divergence along their motions.
 """
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numba import njit
 
-from ..fluids.base import Fluid
+from ..fluids.base import Fluid, Response
 from ..linalg.constraints import Prescribed
-from ..rods.geometry import Configuration
+from ..linalg.normal_numbers import Draw, NormalNumbers, Purpose
+from ..linalg.vectors import at, plus, put
 from ..rods.mesh import Mesh
-from .base import State, Step, System
-
-if TYPE_CHECKING:
-    from ..fluids.resistive_force import Drag
+from .base import State, System
 
 
-def own_weight(mesh: Mesh) -> np.ndarray:
-    """W1_ii (n,): how much of its own position is in the derivative r' of each node, per length."""
-    rows = np.arange(len(mesh.ds))
-    return mesh.w1[rows, rows - mesh.first]
+class Asked(NamedTuple):
+    """A step whose random motion is asked for: rods, fluid and state, the fluid's response, its time and its tau."""
+
+    system: System
+    fluid: Fluid
+    state: State
+    response: Response
+    time: float
+    tau: float
+
+
+class Drift(Protocol):
+    """A way to find the drift."""
+
+    def add(self, asked: Asked, draw: Draw, factor: float, motion: np.ndarray) -> None:
+        """Adds ``factor`` div M to ``motion`` (n, m)."""
+
+
+@njit(cache=True)
+def _add_along(motion, factor, size, metric, e3):
+    """Adds factor size/|r'| e3 to ``motion`` (n, m)."""
+    for i in range(len(size)):
+        put(motion, i, 0, plus(at(motion, i, 0), factor * size[i] / metric[i], at(e3, i, 0)))
+
+
+class EndDrift:
+    """div Z^-1 in resistive-force theory: along the tangent, at the ends and where spacing is uneven.
+
+    In Z^-1 = [1/zeta_perp + (1/zeta_par - 1/zeta_perp) e3 e3]/Lc only e3 depends on the node's own position, by
+    de3 = (1 - e3 e3) W1_ii dr/|r'|, so that it is (d - 1)(1/zeta_par - 1/zeta_perp) W1_ii/(Lc |r'|) e3 in d dimensions,
+    d = 2 in a plane. ``across``, ``along`` (n,) are drag coefficients times control volumes.
+    """
+
+    def __init__(self, across: np.ndarray, along: np.ndarray, mesh: Mesh, planar: bool) -> None:
+        rows = np.arange(len(mesh.ds))
+        own_weight = mesh.w1[rows, rows - mesh.first]  # W1_ii: how much of its own position is in r' of a node
+        self._size = (1 if planar else 2) * (1 / along - 1 / across) * own_weight
+
+    def add(self, asked: Asked, draw: Draw, factor: float, motion: np.ndarray) -> None:
+        """By that formula; no turns."""
+        configuration = asked.state.configuration
+        _add_along(motion, factor, self._size, configuration.metric, configuration.e3)
+
+
+class Divergence:
+    """div M of any fluid, by a random finite difference of one sample, exact in the mean.
+
+        1/delta [M(q + delta w) - M(q)] w,     w (n, m) normal on the unknowns ``free`` (n, m), zero elsewhere
+
+    M is the mobility that held unknowns leave, as `forced` answers with it. Two forces of opposite sign take away what
+    is moved without them. Odd moments of w vanish, so that a difference to one side has no error of first order in
+    ``delta``. Turns have no part: M does not depend on them.
+    """
+
+    def __init__(self, delta: float, free: np.ndarray) -> None:
+        self._delta, self._free = delta, free
+
+    def add(self, asked: Asked, draw: Draw, factor: float, motion: np.ndarray) -> None:
+        """By one more response."""
+        w = draw(Purpose.DRIFT, motion.shape) * self._free
+        there = asked.system.move(asked.state.configuration, self._delta * w)
+        displaced = asked.fluid.response(there.r, there.e3, asked.time, asked.tau)
+        held = asked.system.held(asked.time, asked.time)
+        still = held._replace(value=np.zeros(held.value.shape))
+        moved = [_moved_by(response, w, still) for response in (displaced, asked.response)]
+        motion += factor / (2 * asked.tau * self._delta) * (moved[0] - moved[1])
+
+
+def _moved_by(response: Response, force: np.ndarray, held: Prescribed) -> np.ndarray:
+    """2 tau M force (n, m)."""
+    zero = np.zeros_like(force)
+    return response.forced(force, held, zero).move - response.forced(-force, held, zero).move
 
 
 class Noise:
-    """The thermal force on n nodes over a step, from a seeded stream of normal numbers.
+    """The random motion of n nodes over a step.
 
-    ``drag`` holds drag coefficients times control volumes, ``held`` (k,) the flat indices of held unknowns,
-    ``energy`` is kT. ``planar`` leaves out the lab's z component, for rods in a plane z = const; ``twist``: whether
-    nodes are turned as well.
+    ``energy`` is kT, ``moved`` (n, m) one where a component has thermal motion and zero elsewhere, as along z of rods
+    in a plane z = const, and for turns of rods that do not twist.
     """
 
-    def __init__(
-        self,
-        drag: Drag,
-        mesh: Mesh,
-        held: np.ndarray,
-        unknowns: int,
-        energy: float,
-        seed: int,
-        planar: bool,
-        twist: bool,
-    ) -> None:
-        self._random = np.random.Generator(np.random.PCG64(seed))
-        self._across, self._along = (np.sqrt(2 * energy * z)[:, None] for z in (drag.perp, drag.par))
-        self._spin = np.sqrt(2 * energy * drag.spin) if twist else np.zeros(len(drag.spin))
-        kicked = np.ones((len(drag.perp), unknowns))
-        if planar:
-            kicked[:, 2] = 0.0
-        kicked.ravel()[held] = 0.0
-        self._kicked = kicked
-        self._drift = ((1 if planar else 2) * energy * (1 - drag.par / drag.perp) * own_weight(mesh))[:, None]
+    def __init__(self, energy: float, seed: int, moved: np.ndarray, drift: Drift) -> None:
+        self.energy = energy
+        self._moved, self._drift = None if moved.all() else moved, drift
+        self._numbers, self._trials = NormalNumbers(seed), NormalNumbers(0, trial=True)
 
-    def force(self, configuration: Configuration, dt: float) -> np.ndarray:
-        """The mean force (n, m) of the next kicks, over a step ``dt`` from ``configuration``, Ito's drift included."""
-        normal = self._random.standard_normal(self._kicked.shape)
-        out = np.empty_like(normal)
-        along = np.sum(normal[:, :3] * configuration.e3, axis=1)[:, None] * configuration.e3
-        out[:, :3] = self._across * normal[:, :3] + (self._along - self._across) * along
-        if out.shape[1] == 4:
-            out[:, 3] = self._spin * normal[:, 3]
-        out /= np.sqrt(dt)
-        out[:, :3] += self._drift / configuration.metric[:, None] * configuration.e3
-        return out * self._kicked
+    def motion(self, asked: Asked, dt: float) -> np.ndarray:
+        """xi (n, m) over a step dt, drift included."""
+        state = asked.state
+        draw = Draw(self._numbers, state.steps)
+        out = self._kick(asked.response, draw, dt, state.y_old.shape)
+        self._drift.add(asked, draw, dt * self.energy, out)
+        return self._only_moved(out)
 
-    def state(self) -> str:
-        """Where the stream of random numbers stands, as JSON."""
-        return json.dumps(self._random.bit_generator.state)
+    def trial(self, response: Response, count: int, dt: float, shape: tuple[int, int]) -> np.ndarray:
+        """The ``count``th of the motions without drift that are the same whatever the seed of the run."""
+        return self._only_moved(self._kick(response, Draw(self._trials, count), dt, shape))
 
-    def restore(self, state: str) -> None:
-        """Goes on from where ``state`` says."""
-        self._random.bit_generator.state = json.loads(state)
+    def _kick(self, response: Response, draw: Draw, dt: float, shape: tuple[int, int]) -> np.ndarray:
+        out = response.fluctuation(draw, shape)
+        out *= np.sqrt(2 * self.energy * dt)
+        return out
 
-
-@dataclass(frozen=True)
-class Trapezoid:
-    """The linearised trapezoid: (Z - dt/2 K) y = dt (f + Z u0) + xi, loads and flow those of the middle of the step.
-
-    A fluid's implicit answer over tau = dt/2 to the force f + xi/dt is h with (Z - dt/2 K) h = dt/2 (Z u0 + f) + xi/2:
-    half of y, so the rods go to twice of it. Held unknowns go half their way likewise. K is exact: a part left
-    out would make stiff what is soft, and variances too small.
-    """
-
-    noise: Noise
-    order: int = 1
-
-    def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
-        """One force, one stiffness, one linear solve.
-
-        The force of the step is what the rods do to the fluid: f + K y/2 and reactions, the fluid's kicks not in it.
-        """
-        middle = state.time + 0.5 * dt
-        system.begin(0.5 * dt, 0.0)
-        force, inner = system.forces(state.configuration, middle)
-        matrix = system.stiffness(state.configuration, state.configuration, inner, middle)
-        kicks = self.noise.force(state.configuration, dt)
-        index, value = system.held(state.time, state.time + dt)
-        zero = np.zeros_like(force)
-        response = fluid.response(state.configuration.r, state.configuration.e3, middle, 0.5 * dt)
-        half = response.implicit(force + kicks, matrix, Prescribed(index, 0.5 * value), zero, zero)
-        y = 2 * half.move
-        new = State(state.time + dt, system.move(state.configuration, y), y, dt)
-        return Step(new, y / dt, half.force - kicks, half.reaction, 1, response)
-
-    def amplification(self, z: np.ndarray) -> np.ndarray:
-        """The factor by which a step takes a mode exp(lam t), z = lam dt: that of the trapezoid."""
-        return (1.0 + 0.5 * z) / (1.0 - 0.5 * z)
+    def _only_moved(self, motion: np.ndarray) -> np.ndarray:
+        return motion if self._moved is None else motion * self._moved

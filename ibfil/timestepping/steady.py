@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import StepFailed
 from ..fluids.base import Fluid, Memoryless, Response, Solution
 from ..linalg.constraints import Prescribed
+from ..linalg.normal_numbers import Draw
 from ..linalg.stiffness import Stiffness
 from ..rods.geometry import Configuration, measure
 from ..rods.system import RodSystem
@@ -74,6 +75,9 @@ class _SteadyResponse:
         self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
         return self._inner.implicit(force, stiffness, held, y, target - self._moved)
+
+    def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
+        return self._inner.fluctuation(draw, shape)
 
 
 class SteadyFluid(Memoryless):

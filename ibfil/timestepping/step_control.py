@@ -79,11 +79,12 @@ class FixedStep:
     """Equal steps no longer than ``length``, and than the fluid allows, from one output to the next.
 
     No step is longer than ``growth`` times the one before: BDF2 is stable below 2.41. After a short one, where steps
-    had to be halved or two outputs are close, several lead to where one would have.
+    had to be halved or two outputs are close, several lead to where one would have. The first step of a run is no
+    longer than ``first``: with a growth of two, thermal runs so pass all lengths at which some mode forgets its start.
     """
 
-    def __init__(self, length: float, growth: float = np.inf) -> None:
-        self.length, self._growth = length, growth
+    def __init__(self, length: float, growth: float = np.inf, first: float = np.inf) -> None:
+        self.length, self._growth, self._first = length, growth, first
         self.chosen: tuple[float, ...] = (length,)
         self.shortened = 0
         self._plan = (0.0, 0.0, 1, 1)  # interval start and end, its number of steps, those taken
@@ -104,7 +105,7 @@ class FixedStep:
         goal = self._goal()
         rest, old = goal - state.time, state.dt_old
         dt = self._trial or rest
-        dt = min(dt, self._growth * old) if old > 0 else dt
+        dt = min(dt, self._growth * old if old > 0 else self._first)
         parts = int(np.ceil(rest / dt * (1 - 1e-9)))
         dt = rest if parts <= 1 else min(dt, rest / 2) if parts == 2 else dt
         self._trial = dt

@@ -7,7 +7,7 @@ Units: L = A = 1, drag across 1 per length, so that times are in units of zeta_p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,9 @@ import tomli_w
 
 from ibfil.case.reading import parse_case
 from ibfil.case.schema import Case
+from ibfil.linalg.normal_numbers import Draw, NormalNumbers, Purpose
 from ibfil.simulation.simulation import Simulation
+from ibfil.timestepping.brownian import Asked
 
 USUAL = 0.9973  # how often three standard errors are kept
 SPIN = 0.02
@@ -31,15 +33,17 @@ def scene(
     drag: Mapping[str, float] | str = DRAG,
     fluid: Mapping[str, Any] | None = None,
     time: Mapping[str, Any] | None = None,
+    contact: Mapping[str, Any] | None = None,
     **thermal: Any,
 ) -> Case:
-    """Rods with thermal forces of that energy; ``thermal`` and ``time`` hold further keys of those tables."""
+    """Rods with thermal forces of that energy; ``thermal``, ``time``, ``contact`` are further keys of those tables."""
     text = {
         "filament": {name: dict(rod) for name, rod in rods.items()},
         "fluid": {"model": "rft", "viscosity": 1.0, "drag": drag, **(fluid or {})},
         "thermal": {"energy": energy, **thermal},
         "time": {"end": 1.0, "step": 1e-4, **(time or {})},
         "output": {"every": 1.0},
+        **({} if contact is None else {"contact": dict(contact)}),
     }
     return parse_case(tomli_w.dumps(text), "test.toml")
 
@@ -55,6 +59,26 @@ def walk(simulation: Simulation, steps: int) -> None:
         simulation.accept(simulation.attempt(simulation.step_length), simulation.time + simulation.step_length)
 
 
+def motion(simulation: Simulation, dt: float, step: int = 0) -> np.ndarray:
+    """The random motion xi (n, m) of the ``step``th step, of length dt, from the present configuration."""
+    state = simulation.state_now._replace(steps=step)
+    q, middle = state.configuration, state.time + 0.5 * dt
+    response = simulation.fluid.response(q.r, q.e3, middle, 0.5 * dt)
+    return simulation.model.noise.motion(
+        Asked(simulation.system, simulation.fluid, state, response, middle, 0.5 * dt), dt
+    )
+
+
+def drift(simulation: Simulation, step: int = 0) -> np.ndarray:
+    """kT div M (n, m), as one step finds it."""
+    noise, state = simulation.model.noise, simulation.state_now
+    q, out = state.configuration, np.zeros((len(simulation.arclength), simulation.system.unknowns))
+    response = simulation.fluid.response(q.r, q.e3, state.time, 1.0)
+    asked = Asked(simulation.system, simulation.fluid, state, response, state.time, 1.0)
+    noise._drift.add(asked, Draw(NormalNumbers(1), step), noise.energy, out)
+    return out
+
+
 def blocks(simulation: Simulation) -> np.ndarray:
     """Z (n, m, m) of every node, from the case alone: half a segment at an end."""
     rod = next(iter(simulation.case.filaments.values()))
@@ -68,3 +92,26 @@ def blocks(simulation: Simulation) -> np.ndarray:
     if m == 4:
         out[:, 3, 3] = SPIN
     return volume[:, None, None] * out
+
+
+class Unit:
+    """Numbers of which one, the ``place``th of all that are asked for, is ``size`` and the others are zero."""
+
+    def __init__(self, place: int, size: float = 1.0) -> None:
+        self.place, self.size, self.asked = place, size, 0
+
+    def __call__(self, purpose: Purpose, shape: tuple[int, ...]) -> np.ndarray:
+        out = np.zeros(shape)
+        here = self.place - self.asked
+        if 0 <= here < out.size:
+            out.ravel()[here] = self.size
+        self.asked += out.size
+        return out
+
+
+def moved_by_units(move: Callable[[Unit], np.ndarray]) -> np.ndarray:
+    """The matrix whose columns are the moves that each random number gives by itself."""
+    counted = Unit(0)
+    columns = [move(counted).ravel()]
+    columns += [move(Unit(place)).ravel() for place in range(1, counted.asked)]
+    return np.array(columns).T

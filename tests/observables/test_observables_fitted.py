@@ -172,9 +172,12 @@ def test_diffusion_ratio_is_of_mean_squares_about_the_axis_at_each_start(shape):
     # Across there are two directions: D_perp/D_par = (0.2^2/2) / 0.5^2.
     keys = 'kind = "diffusion_ratio"\ninterval = 0.1'
     series, summary = seen(keys, motion, times)
-    assert np.isnan(series[0])
-    assert series[1:] == pytest.approx(0.08)
+    assert np.all(np.isnan(series[0]))
+    assert series[1:, 0] == pytest.approx(np.full(100, 0.25))
+    assert np.sum(series[1:, 1:], axis=1) == pytest.approx(np.full(100, 0.04))
     assert summary.value == pytest.approx(0.08)
+    for kind, expected in (("", 0.29 / 6), ("_along", 0.25 / 2), ("_across", 0.04 / 4)):
+        assert value(f'kind = "diffusion{kind}"\ninterval = 0.1', motion, times) == pytest.approx(expected / 0.1)
     # An irregular last output is no interval.
     assert value(keys, lambda t: motion(round(10 * t) / 10), [*times, 10.03]) == pytest.approx(0.08)
 

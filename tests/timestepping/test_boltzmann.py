@@ -166,7 +166,7 @@ def distances(nodes: int, rods: int, energy: float, stretching: float, dt: float
     rod = {**ROD, "nodes": nodes, "stretching": stretching}
     simulation = many(rod, rods, energy, dt, drag={"perp": 1.0, "par": 0.5})
     if not drift:
-        simulation.model.noise._drift[:] = 0
+        simulation.model.noise._drift._size[:] = 0
     r = chains(rods, nodes, energy, seed=1).reshape(-1, 3)
     start = simulation.system.start(r, np.tile([0.0, 0.0, 1.0], (len(r), 1)))
     simulation.state_now = State(0.0, start, np.zeros_like(r), 0.0)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ...grid.periodic_grid import Lattice
     from ...io.snapshots import Snapshot
     from ...rods.geometry import Configuration
+    from ...timestepping.brownian import Drift
     from ..stacked import RodStack
 
 
@@ -65,6 +66,10 @@ class FluidModel(ABC):
     @abstractmethod
     def build(self, rods: RodStack) -> Fluid:
         """The fluid that answers to these rods. Raises CaseError where it cannot be made."""
+
+    def drift(self, rods: RodStack) -> Drift:
+        """The drift of these rods' thermal motion in it. Only where thermal forces are allowed."""
+        raise NotImplementedError(self.case.fluid.model)
 
     @abstractmethod
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
@@ -108,6 +113,11 @@ class FluidModel(ABC):
         return {}
 
     # -- the speeds of the scene
+
+    @property
+    def spacing(self) -> float | None:
+        """The spacing of the points that nodes push; None where there are none."""
+        return None
 
     @abstractmethod
     def drag(self, filament: Filament) -> float:

@@ -87,7 +87,7 @@ class FreeModel(ImmersedModel):
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         counts = [where.stop - where.start for where in rods.nodes]
-        return costs.of_methods(self.case, counts, self.components, {"fft": self.evaluation(rods)})
+        return costs.without_box(self.case, counts, self.components, self.evaluation(rods))
 
     def evaluation(self, rods: RodStack) -> float:
         """By convolutions in the nodes' box."""

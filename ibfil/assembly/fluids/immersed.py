@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ...fluids.resistive_force import Drag
     from ...fluids.spaces.base import Space
     from ...grid.kernels import Kernel
+    from ...timestepping.brownian import Drift
     from ..stacked import RodStack
     from .base import Scene
 
@@ -57,6 +58,21 @@ class ImmersedModel(FluidModel):
     def build(self, rods: RodStack) -> Fluid:
         """The fluid by the method of the case, or the one that counts say is cheapest."""
         return self.fluid(rods, self.immersed(rods), self.method(rods))
+
+    def drift(self, rods: RodStack) -> Drift:
+        """By a random finite difference over a ten-thousandth of the spacing."""
+        from ...timestepping.brownian import Divergence
+
+        assert self.case.thermal is not None
+        free = np.ones((len(rods.s), rods.system.unknowns))
+        free.ravel()[rods.system.ends.index] = 0.0
+        free[:, 2 if self.case.thermal.planar else 3 :] = 0.0
+        return Divergence(1e-4 * self.spacing, free)
+
+    @property
+    def spacing(self) -> float:
+        """That of the space."""
+        return self.space.spacing
 
     def immersed(self, rods: RodStack) -> Immersed:
         """The ingredients of every fluid in this space."""

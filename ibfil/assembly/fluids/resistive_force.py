@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ...fluids.base import Fluid
     from ...fluids.output import FluidOutput
     from ...fluids.resistive_force import Drag
+    from ...timestepping.brownian import Drift
     from ..stacked import RodStack
     from .base import Scene
 
@@ -30,6 +31,14 @@ class ResistiveForceModel(FluidModel):
     def build(self, rods: RodStack) -> Fluid:
         """Drag per node, in the background flow."""
         return self.local_fluid(rods)
+
+    def drift(self, rods: RodStack) -> Drift:
+        """That of the ends, from the drag."""
+        from ...timestepping.brownian import EndDrift
+
+        assert self.case.thermal is not None
+        found = drag(self.case, rods)
+        return EndDrift(found.perp, found.par, rods.system.mesh, self.case.thermal.planar)
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """The heat of drag."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,11 @@ class StokesModel(GridModel):
             return stokes.StokesByTable(immersed)
         solver = self.solver(rods, method)
         if method == "krylov":
-            return stokes.StokesByKrylov(immersed, solver, self.factor_cost(rods))
+            from ...fluids.roots import SpectralRoot
+
+            fluid, threads = self.case.fluid, self.case.compute.threads
+            root = partial(SpectralRoot, self.grid, fluid.viscosity, immersed.coupling, immersed.own, threads)
+            return stokes.StokesByKrylov(immersed, solver, self.factor_cost(rods), root=root)
         return stokes.StokesByFFT(immersed, solver)
 
     def memory(self, rods: RodStack) -> dict[str, float]:

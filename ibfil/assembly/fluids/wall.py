@@ -108,7 +108,7 @@ class WallModel(FreeModel):
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         counts = [where.stop - where.start for where in rods.nodes]
-        return costs.of_methods(self.case, counts, self.components, {"fft": self.evaluation(rods)}, _IMAGES)
+        return costs.without_box(self.case, counts, self.components, self.evaluation(rods), _IMAGES)
 
     def evaluation(self, rods: RodStack) -> float:
         """Twice as many transforms as in free space, or twice as many nodes."""

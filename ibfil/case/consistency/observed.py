@@ -45,9 +45,9 @@ def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
         yield Fault(f"{key}.over", shown(entry.over), "[t1, t2] with 0 <= t1 < t2")
     if entry.along is not None and not any(entry.along):
         yield Fault(f"{key}.along", shown(entry.along), "a vector that is not zero")
-    if (entry.kind == "diffusion_ratio") != (entry.interval > 0.0):
+    if entry.kind.startswith("diffusion") != (entry.interval > 0.0):
         found = f'{entry.interval:g} with kind = "{entry.kind}"'
-        yield Fault(f"{key}.interval", found, "> 0 with diffusion_ratio, and only there", (f"{key}.kind",))
+        yield Fault(f"{key}.interval", found, "> 0 with diffusion, and only there", (f"{key}.kind",))
 
 
 def _of_link(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
@@ -92,9 +92,12 @@ def _expect(case: Scene) -> Iterator[Fault]:
         elif entry.range is not None and not entry.range[0] < entry.range[1]:
             yield Fault(f"{key}.range", shown(entry.range), "[lo, hi] with lo < hi")
         reads = (f"{key}.value", f"{key}.range", f"{key}.absolute")
-        if entry.range is not None and (entry.tolerance is not None or entry.absolute is not None):
+        if entry.standard_errors is not None and (entry.range is not None or case.thermal is None):
+            found = f"{entry.standard_errors:g}" + (" with range" if case.thermal is not None else " without [thermal]")
+            yield Fault(f"{key}.standard_errors", found, "only with value, of a thermal run", (*reads, "thermal"))
+        elif entry.range is not None and (entry.tolerance is not None or entry.absolute is not None):
             yield Fault(f"{key}.tolerance", "a tolerance with range", "tolerance or absolute only with value", reads)
         elif entry.tolerance is not None and entry.absolute is not None:
             yield Fault(f"{key}.tolerance", "tolerance and absolute", "one of them", reads)
-        elif entry.value == 0.0 and entry.absolute is None:
+        elif entry.value == 0.0 and entry.absolute is None and entry.standard_errors is None:
             yield Fault(f"{key}.tolerance", "a relative tolerance of value = 0", "absolute", reads)

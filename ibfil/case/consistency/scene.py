@@ -20,6 +20,7 @@ from .observed import check_observed
 from .sheet import check_sheet
 from .size import check_size
 from .space import check_space
+from .thermal import check_thermal
 from .thickness import check_thickness
 
 THINNEST = {"slender": (0.5 * math.exp(-0.5), "L/(2 sqrt(e))"), "cylinder": (0.25, "L/4")}  # of the length: the radius
@@ -42,7 +43,7 @@ def check(case: Scene) -> Iterator[Fault]:
         _matched,
         check_thickness,
         check_sheet,
-        _thermal,
+        check_thermal,
         _time,
         _output,
         check_observed,
@@ -149,28 +150,6 @@ def _matched(case: Scene) -> Iterator[Fault]:
         reads = (f"filament.{name}.length", f"filament.{name}.nodes", "fluid.model")
         if not ds <= length <= LONGEST * ds:
             yield Fault(key, found, f"{ds:g} to {LONGEST * ds:g}: 1 to {LONGEST} segments of {name}", reads)
-
-
-def _thermal(case: Scene) -> Iterator[Fault]:
-    if case.thermal is None:
-        return
-    if case.fluid.model != "rft":
-        found = (
-            f"thermal forces and fluid.model = {shown(case.fluid.model)}, in which kicks of different nodes are related"
-        )
-        yield Fault("thermal", found, 'only fluid.model = "rft"', ("fluid.model",))
-    if case.thermal.twist and all(filament.twisting is None for filament in case.filaments.values()):
-        yield Fault("thermal.twist", "true", "false where no filament has twisting", ("filament",))
-    if case.time.scheme != "semi-implicit":
-        yield Fault(
-            "time.scheme",
-            shown(case.time.scheme),
-            '"semi-implicit", the only one with [thermal]',
-            ("thermal",),
-        )
-    if case.time.tolerance is not None:
-        found = "a tolerance with [thermal], whose kicks no shorter step follows more closely"
-        yield Fault("time.tolerance", found, "time.step", ("thermal",))
 
 
 def _time(case: Scene) -> Iterator[Fault]:

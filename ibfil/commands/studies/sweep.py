@@ -35,7 +35,11 @@ def do(arguments: argparse.Namespace) -> int:
     with opened(arguments.executor, arguments.jobs) as pool:
         rows = sweep.sweep(case, varied, folder, changes, jobs=arguments.jobs, executor=pool, log=tell)
     print_table([row.row() for row in rows], ("run", "message"))
-    tell(folder / sweep.TABLE)
+    summed = sweep.means_over_seeds(rows)
+    if summed:
+        tell("means over the seeds of thermal forces, and their standard errors")
+        print_table([mean.row() for mean in summed])
+    tell(", ".join([str(folder / sweep.TABLE), *([sweep.MEANS] if summed else [])]))
     return 0 if all(row.outcome.done for row in rows) else 1
 
 

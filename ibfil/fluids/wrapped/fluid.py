@@ -19,6 +19,7 @@ import numpy as np
 
 from ...linalg import banded
 from ...linalg.constraints import Prescribed
+from ...linalg.normal_numbers import Draw
 from ...linalg.stiffness import Stiffness, no_pairs
 from ..base import Fluid, Response, Solution
 
@@ -107,6 +108,10 @@ class _Response:
         constant, own = self._own(force.shape)
         given = force + constant - banded.multiply(own, y - target)
         return self._of_rods(self.inner.implicit(given, self._less(stiffness, own), held, y, target), y, target)
+
+    def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
+        """Not known: forces that resist motion have a noise of their own, and cases with both are refused."""
+        raise NotImplementedError
 
 
 class Wrapped:
