@@ -148,7 +148,7 @@ def half_cell(base: Base, under: tuple[str, ...]) -> tuple[Member, np.ndarray]:
     shift = np.full(3, 0.5 * spacing(base.case))
     if base.case.fluid.thin_axis is not None:
         shift[base.case.fluid.thin_axis] = 0.0  # sheets stay in their plane
-    if getattr(base.case.fluid, "wall", None) is not None:
+    if base.case.fluid.wall is not None:
         shift[2] = 0.0  # another height would be another scene
     overrides = (*place.moved(base.simulation, shift), *(under or base.same_step))
     return base.member_of("place", overrides), shift
