@@ -113,7 +113,11 @@ class Fluid(Table):
     kernel: Literal["roma3", "peskin4", "bspline4", "bspline6", "bkp6", "es4", "es5", "es6"] = Field(
         "peskin4", description="delta function"
     )
-    slip: NotNegative = Field(0.01, description="slip mobility eps, of a point's own, against locking; 0 = off")
+    slip: NotNegative = Field(
+        0.01,
+        description="slip eps against locking: nodes ds apart slip by eps h/(2 ds) of a point's own mobility, ends by "
+        "twice that; 0 = off",
+    )
     method: Literal["auto", "fft", "pruned", "table", "krylov"] = Field(
         "auto", description="how velocities are found; auto decides by counts"
     )

@@ -6,11 +6,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..case.spacing import node_arclength
+from ..case.table import expressions
 from ..simulation import timescales
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..simulation.simulation import Simulation
+
+
+_BENDS = ("curvature.", "twist_rate", "loads.", "shape.")  # keys of what varies along a rod and moves or bends it
 
 
 def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
@@ -28,11 +33,35 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
     out["EA L^2/A"] = stretching * length**2 / bending
     if case.thermal is not None and case.thermal.energy > 0:
         out["A/(kT L)"] = bending / (case.thermal.energy * length)
+    wave, ds = shortest_wave(filament, case.time.end), np.max(np.diff(node_arclength(filament)))
+    if wave < np.inf:
+        out["wavelength/ds"] = float(wave / ds)
     if filament.mass is not None:
         drag = simulation.drag(filament)
         time = 1 / rate if rate else simulation.bending_time()
         out["m/(zeta T), inertia of the rod"] = timescales.mean_mass(filament) / (drag * time)
     return out | simulation.model.fluid_model.groups(filament, rate)
+
+
+def shortest_wave(filament: Filament, end: float) -> float:
+    """The shortest wave along the rod of what bends, twists, loads or shapes it; infinite where nothing does in s.
+
+    Twice the least distance between neighbouring places where a formula passes its mean, at the start, the middle and
+    the end of the run: that of a sinusoid exactly, and of a load on a part of the rod twice its width.
+    """
+    s, found = np.linspace(0.0, filament.length, 2001), np.inf
+    for path, expression in expressions(filament):
+        if "s" not in expression.variables or not path.startswith(_BENDS):
+            continue
+        for time in (0.0, 0.5 * end, end):
+            values = np.broadcast_to(expression.bind("s", "t")(s, time), s.shape)
+            above = values - np.mean(values)
+            above = np.sign(np.where(np.abs(above) > 1e-9 * np.max(np.abs(values)), above, 0.0))
+            seen = np.flatnonzero(above)
+            crossings = s[seen[1:]][np.diff(above[seen]) != 0]
+            if len(crossings) > 1:
+                found = min(found, 2 * float(np.min(np.diff(crossings))))
+    return found
 
 
 class Oscillation(NamedTuple):

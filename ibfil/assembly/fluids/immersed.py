@@ -198,7 +198,7 @@ class ImmersedModel(FluidModel):
         """Slip, and how rods spin."""
         out = []
         if self.case.fluid.slip:
-            out.append(f"slip mobility of {self.case.fluid.slip:g} of a point's own, against locking")
+            out += [self._slip(name, filament) for name, filament in self.case.filaments.items()]
         if self.case.couples_torque:
             out.append(
                 "twist torques stir the grid as half a curl, rods spin with half its vorticity (rotation = grid)"
@@ -206,6 +206,15 @@ class ImmersedModel(FluidModel):
         elif self.case.twists:
             out.append("spin against the rod's own drag (rotation = local)")
         return out
+
+    def _slip(self, name: str, filament: Filament) -> str:
+        """The slip of a filament's nodes, eps h/(2 ds), in terms of what a point moves by itself."""
+        apart = filament.length / (filament.nodes - 1) / self.space.spacing
+        share = 100 * self.case.fluid.slip / (2 * apart)
+        return (
+            f"slip of {name} against locking: nodes {apart:.3g} h apart slip by {share:.2g} % of a point's own "
+            f"mobility, ends by {2 * share:.2g} % (fluid.slip = {self.case.fluid.slip:g})"
+        )
 
     def absent(self) -> list[str]:
         """Torque coupling, where it is not asked for."""
