@@ -31,6 +31,8 @@ def do(arguments: argparse.Namespace) -> int:
 
     simulation = Simulation(case)
     overview_of(simulation)
+    fields = case.output.fields if simulation.grid is not None else ()
+    simulation.snapshot(fields)  # the motion before any step is found in another way
     first: list[float] = []
 
     def count() -> None:
@@ -40,6 +42,6 @@ def do(arguments: argparse.Namespace) -> int:
 
     with suppress(_EnoughError):
         simulation.advance(case.time.end, count)
-    simulation.snapshot(case.output.fields if simulation.grid is not None else ())
+    simulation.snapshot(fields)
     tell(f"{case.title or arguments.words[0]}: warm; its first step was done after {first[0]:.1f} s")
     return DONE
