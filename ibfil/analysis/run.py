@@ -51,12 +51,7 @@ class Run(RunFile):
 
     @property
     def numbers(self) -> dict[str, float | np.ndarray]:
-        """The number, or vector (3,), of each observable of the case: of a drift the speed, of a growth the rate.
-
-        >>> with ibfil.open("run.h5") as run:
-        ...     print(run.numbers)
-        {}
-        """
+        """The number, or vector (3,), of each observable of the case: of a drift the speed, of a growth the rate."""
         from ..observables.factory import numbers_of
 
         return {name: one.value for name, one in numbers_of(self.case, self.time, self.observables).items()}

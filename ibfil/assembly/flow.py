@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..case.separation import products
 from ..fluids.base import Part
 from .loads import number, triple
+from .separation import products
 
 if TYPE_CHECKING:
     from ..case.schema import Case
-    from ..case.separation import Product
     from ..fluids.base import Flow
+    from .separation import Product
 
 
 def flow(case: Case) -> Flow | None:

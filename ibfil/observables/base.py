@@ -17,7 +17,8 @@ from . import time_series
 from .blocks import StandardError, means_of_blocks, standard_error
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 Value = float | np.ndarray

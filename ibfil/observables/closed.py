@@ -10,7 +10,8 @@ from .base import Unfit, Value
 from .local import SUMMARY, OfFilament
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 class OfClosed(OfFilament):

@@ -17,7 +17,8 @@ from .blocks import StandardError, means_of_blocks, standard_error
 from .local import AtPlace
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 class Steps(AtPlace):

@@ -12,7 +12,8 @@ from .base import Value
 from .observers import Summary
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Expect
+    from ..case.observe import Expect
+    from ..case.schema import Case
 
 
 @dataclass(frozen=True)

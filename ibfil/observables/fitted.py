@@ -17,7 +17,8 @@ from .local import Amplitude, AtPlace, Component, OfFilament
 from .location import Location
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 class Drift(Component, kind="drift"):

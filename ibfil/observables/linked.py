@@ -11,7 +11,8 @@ from ..io.snapshots import LinkSnapshot, Snapshot
 from .base import ObservableBase, Unfit, Value
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 _OVER: dict[str, str] = {"none": "mean", "mean": "mean", "max": "max", "min": "min"}

@@ -19,7 +19,8 @@ from .location import Location, reduced
 from .time_series import trapezoid_weights
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 SUMMARY = ("over", "summary")

@@ -11,7 +11,8 @@ from .base import Observable
 from .observers import ObservableSet
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Stop
+    from ..case.observe import Stop
+    from ..case.schema import Case
 
 
 class StopRules:

@@ -11,7 +11,8 @@ from .base import ObservableBase, Unfit
 from .local import SUMMARY
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 class Dissipation(ObservableBase, kind="dissipation"):

@@ -12,7 +12,8 @@ from .local import SUMMARY, OfFilament, distance_across
 from .location import Location
 
 if TYPE_CHECKING:
-    from ..case.schema import Case, Observe
+    from ..case.observe import Observe
+    from ..case.schema import Case
 
 
 SUPPORTS = {"start": (-1.0, 0), "finish": (1.0, -1)}  # sign of the moment that a support gives, and its node

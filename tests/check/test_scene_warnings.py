@@ -47,7 +47,6 @@ FORCE = "fluid.box: the rods push the fluid with a net force"
         ),
         (["observe.x={kind='speed', filament='rod', over=[0.1, 0.2]}"], "observe.x.over: it begins at 0.1, not before"),
         (["output.every=0.2"], "output.every: 0.2 is beyond time.end = 0.1"),
-        (["fluid.model=rft", "filament.rod.radius=0.3"], ""),  # a grid's matter
         (["filament.rod.mass=0.1"], ""),  # overdamped
         (["filament.rod.mass=10"], ""),  # omega = 7.1: dt = 0.01 takes 0.2 % of it
         (["filament.rod.mass=10", "time.step=0.05"], "time.step: filament rod oscillates at omega = 7.05"),

@@ -77,7 +77,7 @@ def test_descriptions_and_units():
 def test_every_kind_of_the_schema_is_built():
     from typing import get_args
 
-    from ibfil.case.schema import Observe
+    from ibfil.case.observe import Observe
 
     observing('kind = "position"')
     assert set(KINDS) == set(get_args(Observe.model_fields["kind"].annotation))

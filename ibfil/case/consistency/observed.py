@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from ..expressions import suggestion
 from ..faults import Fault, shown
 from ..filament import copy_name, single
-from ..schema import Observe, Scene
+from ..observe import Observe
+from ..schema import Scene
 
 # Three numbers where `along` is absent.
 VECTORS = ("position", "velocity", "displacement", "drift", "force", "torque")

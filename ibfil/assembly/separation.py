@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .expressions import Expression, Tree, of_tree
+from ..case.expressions import Expression, Tree, of_tree
 
 MOST = 4  # products of a flow, each of which is a whole field
 LONGEST = 64  # of those that are looked at on the way there

@@ -7,9 +7,9 @@ import pytest
 from helpers.inertial_fluid import fluid
 
 from ibfil.assembly.flow import flow_parts
+from ibfil.assembly.separation import products
 from ibfil.case.expressions import parse
 from ibfil.case.reading import read_case
-from ibfil.case.separation import products
 from ibfil.check.budget import memory
 from ibfil.check.report import report
 from ibfil.simulation.simulation import Simulation
