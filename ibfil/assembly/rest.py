@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 LONG = 1.0  # of zeta L^4/A, some 500 times the slowest bending time: longer, rounding turns the rod
 STEPS = 4  # each leaves a five-hundredth of what was out of rest
-CLOSE = 1e-9  # of the length: the last correction
+CLOSE = 1e-11  # of the length: the last correction
 NEAR = 0.05  # of the length: nodes that would have to move further do not resolve the curve
 
 

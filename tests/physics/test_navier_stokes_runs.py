@@ -157,7 +157,7 @@ def test_given_steps_in_which_the_fluid_goes_too_far_are_told_once():
     simulation = run(swimmer(stream, rod={"nodes": 11}, stretching=300.0, end=0.05, step=0.0125))
     assert simulation.steps == 4
     (told,) = simulation.notices
-    assert re.search(r"at t = 0\.0125 the fluid crosses 2\.[0-4] cells in a step.*take a step below 0\.00", told)
+    assert re.search(r"at t = 0\.0125 the fluid crosses 2(\.[0-4])? cells in a step.*take a step below 0\.00", told)
 
 
 def test_single_precision_keeps_single_fields_and_is_off_by_a_millionth():

@@ -38,7 +38,7 @@ def write(path: Path, scene: SceneAtRest, poses: Iterator[Pose], method: str, re
     simulation = scene.simulation
     seen, diagnostics = observers(simulation.case), Diagnostics(simulation.model)
     first = next(poses)
-    meanings = {name: Meaning(one.dimension, one.description) for name, one in seen.observables.items()}
+    meanings = {seen.recorded(name): Meaning(one.dimension, one.description) for name, one in seen.observables.items()}
     recorder: Recorder | None = None
     for pose in chain([first], poses):
         force, _ = scene.system.forces(pose.configuration, 0.0)

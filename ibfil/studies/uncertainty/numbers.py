@@ -45,7 +45,7 @@ class Recorded:
         self.case, self.time = run.case, np.array(run.time)
         known = observers(run.case).observables
         self.observables: dict[str, Observable] = {name: known[name] for name in wanted}
-        self.series = {name: np.array(run.observables[name]) for name in self.observables}
+        self.series = {name: np.array(run.observables[run.case.observe[name].recorded(name)]) for name in wanted}
 
     def of(self, run: RunFile) -> Recorded:
         """The same observables of another run."""
