@@ -164,6 +164,12 @@ def _shape(key: str, filament: Filament) -> Iterator[Fault]:
         yield Fault(f"{key}.shape.curvature", found, f"at most 2 pi/length = {most:.6g}", (f"{key}.length",))
 
 
+def _turns(end: End) -> bool:
+    """Whether the moment on an end is a torque along the rod alone, which may turn there."""
+    assert end.moment is not None
+    return end.twist == "free" and end.body_frame and all(part.constant == 0.0 for part in end.moment[:2])
+
+
 def _end(key: str, end: End) -> Iterator[Fault]:
     """Free ends feel forces, held ones are moved; only a clamp knows a tangent and a twist."""
     reads = (f"{key}.end",)
@@ -178,7 +184,12 @@ def _end(key: str, end: End) -> Iterator[Fault]:
     yield from only("moves", "hinged or clamped", end.held)
     for name in ("force", "follower", "spring"):
         yield from only(name, "free", not end.held)
-    yield from only("moment", "free or hinged", not clamped)
+    if end.moment is not None and clamped and not _turns(end):
+        allowed = (
+            'at a free or hinged end; at a clamped one [0, 0, m], a torque, with twist = "free" and frame = "body"'
+        )
+        reads = (*reads, f"{key}.twist", f"{key}.frame")
+        yield Fault(f"{key}.moment", 'moment with end = "clamped", which holds the tangent', allowed, reads)
     if end.twist == "held" and not clamped:
         yield Fault(f"{key}.twist", f'"held" with end = "{end.end}"', '"held" only at a clamped end', reads)
     turned = [name for name in ("spin", "angle") if getattr(end, name) is not None]
