@@ -48,7 +48,11 @@ _DIAGNOSTICS = {
     "stretch_min": ("1", "smallest stretch of a segment, length over rest length minus 1"),
     "power": ("force length/time", "power of the nodal forces and twist torques on the fluid over that step"),
     "kinetic_energy": ("force length", "kinetic energy of the rods' mass and rotary inertia"),
-    "dissipation": ("force length/time", "power that the fluid turns into heat: eta int |grad u|^2, or of the drag"),
+    "dissipation": (
+        "force length/time",
+        "power that the fluid turns into heat: of all drag in rft; on a grid and in free space that of the flow alone, "
+        "beside which slip_power and the drag of spins that do not stir it (rotation = local) turn more",
+    ),
     "couple_dissipation": ("force length/time", "the part of it by the couple of flows across the rods' thickness"),
     "grid_power": ("force length/time", "power of the nodal forces upon the grid's own flow"),
     "slip_power": ("force length/time", "power lost between nodes and grid: the slip's share"),

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 class Dissipation(ObservableBase, kind="dissipation"):
     """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
 
-    On a grid it costs an evaluation of the fluid at each output.
+    On a grid it is that of the flow alone: slip, and spins with rotation = "local", turn more into heat beside it. It
+    costs an evaluation of the fluid at each output there.
     """
 
     keys: ClassVar[tuple[str, ...]] = SUMMARY

@@ -77,7 +77,11 @@ COMBINATIONS = [
     ([f"{ROD}.start={{end='hinged', force=[1, 0, 0]}}"], f"{ROD}.start.force", "only at a free end"),
     ([f"{ROD}.finish={{end='clamped', follower=1}}"], f"{ROD}.finish.follower", "only at a free end"),
     ([f"{ROD}.finish={{end='hinged', spring={{stiffness=1}}}}"], f"{ROD}.finish.spring", "only at a free"),
-    ([f"{ROD}.finish={{end='clamped', moment=[0, 0, 1]}}"], f"{ROD}.finish.moment", "at a free or hinged end; at a clamped one"),
+    (
+        [f"{ROD}.finish={{end='clamped', moment=[0, 0, 1]}}"],
+        f"{ROD}.finish.moment",
+        "at a free or hinged end; at a clamped one",
+    ),
     ([f"{ROD}.finish.frame=body"], f"{ROD}.finish.frame", "only with moment"),
     ([*TWISTED, f"{ROD}.start.spin=1"], f"{ROD}.start.spin", "only at a clamped end"),
     ([*TWISTED, f"{ROD}.start={{end='clamped', spin=1, angle=1}}"], f"{ROD}.start.angle", "one of them"),
