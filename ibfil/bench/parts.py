@@ -11,6 +11,7 @@ from . import linked as bench_linked
 from . import many as bench_many
 from . import pieces
 from . import spaces as bench_spaces
+from . import thermal as bench_thermal
 from . import threads as bench_threads
 from .timing import Row, table
 
@@ -57,6 +58,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         bench_spaces.wall_pairs("bkp6", 3.0),
         *bench_spaces.transforms(),
     ],
+    "thermal": lambda: bench_thermal.steps(),
     "swimmer": lambda: pieces.swimmers(),
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],
     "links": lambda: [*bench_linked.linked(6, (280.0, None)), *bench_linked.linked(2, (165.0, None))],

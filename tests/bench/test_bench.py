@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ibfil.bench import linked, many, parts, pieces, spaces, timing
+from ibfil.bench import linked, many, parts, pieces, spaces, thermal, timing
 from ibfil.errors import CaseError
 
 
@@ -22,6 +22,7 @@ from ibfil.errors import CaseError
         lambda: linked.linked(2, (1e9, None), nodes=8),
         lambda: [*spaces.tables(), *spaces.steps(11), spaces.wall_pairs("roma3", 3.0, 5)],
         lambda: spaces.transforms((9, 5, 4), 5),
+        lambda: thermal.steps(9, 9),
     ],
 )
 def test_pieces_give_finite_positive_numbers(rows, monkeypatch):

@@ -188,8 +188,8 @@ def _end(key: str, end: End) -> Iterator[Fault]:
         allowed = (
             'at a free or hinged end; at a clamped one [0, 0, m], a torque, with twist = "free" and frame = "body"'
         )
-        reads = (*reads, f"{key}.twist", f"{key}.frame")
-        yield Fault(f"{key}.moment", 'moment with end = "clamped", which holds the tangent', allowed, reads)
+        found = 'moment with end = "clamped", which holds the tangent'
+        yield Fault(f"{key}.moment", found, allowed, (*reads, f"{key}.twist", f"{key}.frame"))
     if end.twist == "held" and not clamped:
         yield Fault(f"{key}.twist", f'"held" with end = "{end.end}"', '"held" only at a clamped end', reads)
     turned = [name for name in ("spin", "angle") if getattr(end, name) is not None]
