@@ -46,12 +46,12 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
 def shortest_wave(filament: Filament, end: float) -> float:
     """The shortest wave along the rod of what bends, twists, loads or shapes it; infinite where nothing does in s.
 
-    Twice the least distance between neighbouring places where a formula passes its mean, at the start, the middle and
-    the end of the run: that of a sinusoid exactly, and of a load on a part of the rod twice its width.
+    The least distance between places where a formula passes its mean the same way, at the start, the middle and the
+    end of the run: that of a sinusoid exactly; of a load on a part of the rod twice its width.
     """
     s, found = np.linspace(0.0, filament.length, 2001), np.inf
     for path, expression in expressions(filament):
-        if "s" not in expression.variables or not path.startswith(_BENDS):
+        if "s" not in expression.variables or expression.variables - {"s", "t"} or not path.startswith(_BENDS):
             continue
         for time in (0.0, 0.5 * end, end):
             values = np.broadcast_to(expression.bind("s", "t")(s, time), s.shape)
@@ -60,7 +60,8 @@ def shortest_wave(filament: Filament, end: float) -> float:
             seen = np.flatnonzero(above)
             crossings = s[seen[1:]][np.diff(above[seen]) != 0]
             if len(crossings) > 1:
-                found = min(found, 2 * float(np.min(np.diff(crossings))))
+                waves = crossings[2:] - crossings[:-2] if len(crossings) > 2 else 2 * np.diff(crossings)
+                found = min(found, float(np.min(waves)))
     return found
 
 

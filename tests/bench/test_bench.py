@@ -54,7 +54,7 @@ def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monke
 
 
 def test_a_part_there_is_not_is_refused():
-    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, spaces, swimmer"):
+    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, spaces, thermal, swimmer"):
         parts.main(parts=["pieces", "nope"])
 
 

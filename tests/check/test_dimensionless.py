@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.scenes import scene
 
-from ibfil.check.dimensionless import groups
+from ibfil.check.dimensionless import groups, shortest_wave
 from ibfil.simulation.simulation import Simulation
 
 # A wave of length 1.25 and angular frequency 4 on a rod of length 2, A = 3, EA = 500.
@@ -53,3 +53,23 @@ def test_of_a_rod_that_spins_with_the_grid():
         rod = {**WAVE, "twisting": 1.0, "radius": radius}
         spun = found(rod, {"model": "stokes", "rotation": "grid", **GRID})
         assert spun["a/L when spun"] == pytest.approx(spins / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"curvature": ["20*sin(30*pi*s - 5*t)", 0]}, 1 / 15),
+        ({"curvature": ["1 + 0.5*t*cos(8*pi*s)", 0]}, 0.25),
+        ({"curvature": ["tanh(20*(s - 1))", 0]}, np.inf),  # a front is no wave
+        ({"curvature": [0, 0], "loads": {"force": [0, "where(s > 0.9, step(1.1 - s), 0)", 0]}}, 0.4),
+        ({"curvature": [0, 0], "loads": {"force": [0, "1e4*(sin(30*pi*s) - y)", 0]}}, np.inf),  # of the place too
+    ],
+)
+def test_the_shortest_wave_along_a_rod(keys: dict[str, Any], expected: float):
+    """Of sinusoids their wavelength, of a load on a part of the rod twice its width."""
+    case = scene({"rod": {**WAVE, **keys}}, {"model": "rft"})
+    assert shortest_wave(case.filaments["rod"], 1.0) == pytest.approx(expected, rel=2e-2)
+
+
+def test_waves_in_segments_are_among_the_groups():
+    assert found(WAVE, {"model": "rft"})["wavelength/ds"] == pytest.approx(1.25 / 0.05, rel=1e-2)

@@ -138,10 +138,11 @@ def test_longer_than_the_box():
 
 
 def test_too_few_cells_a_wavelength():
-    (line,) = warned("filament.rod.curvature=['sin(16*pi*s)', 0]", "filament.rod.stretching=100")
+    waves, line = sorted(warned("filament.rod.curvature=['sin(16*pi*s)', 0]", "filament.rod.stretching=100"))
     found = re.search(rf"({NUMBER}) cells a wavelength \(wavelength/h\): below 15 the rod is as thick", line)
     assert float(found[1]) == pytest.approx(0.125 * 16, rel=0.02)
     assert "take more fluid.cells" in line
+    assert re.match(rf"filament\.rod\.nodes: {NUMBER} segments a wavelength .*take more nodes", waves)
 
 
 def test_net_force_on_a_periodic_box():

@@ -162,7 +162,7 @@ def test_what_is_told_of_a_wall():
 def test_a_start_below_the_wall_and_an_end_held_on_it_without_slip_are_faults():
     below = scene({"rod": {**WAVING, "position": [0, 0, -0.01]}}, WALL)
     with pytest.raises(
-        CaseError, match=r"filament.rod.position: found node 0 at z = -0.01, below the wall; allowed: z >= 0"
+        CaseError, match=r"filament.rod.position: found node \d+ at z = -0.01, below the wall; allowed: z >= 0"
     ):
         Simulation(below)
     standing = {"length": 1.0, "nodes": 21, "bending": 1.0, "stretching": 400.0, "anchor": "start"}
