@@ -196,7 +196,9 @@ class AdaptiveStep:
         ``shortest``: a step that is good enough whatever its error; the first one, and after what drives jumps.
         """
         self.tolerance, self._longest, self._shortest = tolerance, longest, shortest
-        self.length = shortest or min(tolerance / rate, 1.0) ** (2 / 3) / rate  # a guess between both orders, in any units
+        self.length = (
+            shortest or min(tolerance / rate, 1.0) ** (2 / 3) / rate
+        )  # a guess between both orders, in any units
         self._rate, self._order, self._size = rate, order, size
         self.chosen: tuple[float, ...] = (tolerance, rate, longest, shortest)
         self.shortened = 0

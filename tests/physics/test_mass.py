@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.cut import assert_same_bits
 from helpers.scenes import run, scene, slopes
 
 from ibfil.check.dimensionless import oscillations
@@ -225,13 +226,7 @@ def test_in_a_fluid_of_hardly_any_density_it_is_that_of_stokes():
 def test_a_cut_run_goes_on_with_the_same_bits(fluid):
     rod = {**CLAMPED, "nodes": 9, "velocity": ["0", "s**2", "0"]}
     case = scene({"rod": rod}, fluid, end=0.2, step=0.01)
-    whole, cut, again = Simulation(case), Simulation(case), Simulation(case)
-    whole.advance(0.1, lambda: None)
-    whole.advance(0.2, lambda: None)
-    cut.advance(0.1, lambda: None)
-    again.restore(cut.state())
-    again.advance(0.2, lambda: None)
-    assert np.array_equal(again.configuration.table, whole.configuration.table)
+    assert_same_bits(case, 0.1, 0.2)
 
 
 def test_the_first_output_has_the_velocity_it_is_given():
