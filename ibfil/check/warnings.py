@@ -16,6 +16,7 @@ from ..shapes import initial
 from ..simulation import steps
 from ..simulation.thermal_step import MOVE, RINGING, TURN, KickSizes, sizes_of_step
 from .dimensionless import of_filament, oscillations
+from .twist import of_twist
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
@@ -40,6 +41,7 @@ def warnings(simulation: Simulation) -> list[str]:
         key, found = f"filament.{name}", of_filament(simulation, filament)
         out += fluid.warnings_of(simulation, name, found)
         out += _of_waves(key, found)
+        out += of_twist(simulation, name, filament)
         out += _of_held_ends(key, filament)
         out += _of_inertia(simulation, name, filament)
         where = simulation.nodes(name)

@@ -14,7 +14,7 @@ from scipy.stats import qmc
 
 from ibfil.case.schema import Case
 from ibfil.check.warnings import warnings
-from ibfil.errors import CaseError
+from ibfil.errors import CaseError, RunFailed
 from ibfil.linalg.constraints import Prescribed
 from ibfil.simulation import thermal_step
 from ibfil.simulation.simulation import Simulation
@@ -181,15 +181,23 @@ def example(place: np.ndarray, seed: int) -> Case:
 
 
 def survivors(count: int, steps: int) -> Iterator[str]:
-    """The fate of the first ``count`` scenes of the map after so many steps each: "runs", or a refusal."""
+    """The fate of the first ``count`` scenes of the map after so many steps each: "runs", a refusal, or "told".
+
+    Told is that nodes are too far apart for the twist of a helix, which then stops the run.
+    """
     for k, place in enumerate(qmc.Sobol(5, seed=1).random(512)[:count]):
         try:
             simulation = Simulation(example(place, seed=k + 1))
         except CaseError as refused:
             yield str(refused)
             continue
-        while simulation.steps < steps:
-            simulation.advance(simulation.time + 100 * simulation.step_length, lambda: None)
+        try:
+            while simulation.steps < steps:
+                simulation.advance(simulation.time + 100 * simulation.step_length, lambda: None)
+        except RunFailed as failed:
+            soon = [line for line in warnings(simulation) if "soon a quarter turn apart, which stops the run" in line]
+            yield "told" if soon and "twist between two nodes" in str(failed) else str(failed)
+            continue
         yield "runs"
 
 
@@ -201,14 +209,18 @@ def test_the_first_scenes_of_the_map_do_not_explode():
 def test_none_of_512_scenes_explodes_or_it_is_refused_with_a_sentence():
     """8 to 129 nodes, kT L/A from 1e-4 to 0.2, EA L^2/A from 50 to 1e6; straight, helical, clamped, three of them."""
     fates = list(survivors(512, 2000))
-    assert fates.count("runs") == 499
-    assert all(fate == "runs" or "for a thermal stretch of" in fate for fate in fates)
+    assert fates.count("runs") == 498
+    assert fates.count("told") == 1
+    assert all(fate in ("runs", "told") or "for a thermal stretch of" in fate for fate in fates)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("longer", "least"), [(1, 0.0), (4, 0.05)])
+@pytest.mark.parametrize(("longer", "least"), [(1, 0.0), (2, 0.1)])
 def test_what_rings_is_what_the_variance_of_the_stiffest_motion_is_off_by(longer, least):
-    """16 nodes, EA L^2/A = 2e4, kT L/A = 0.02: strains have 1 - W of their variance; without the correction 1 + W."""
+    """Strains have 1 - W of their variance, to first order; without the correction 1 + W.
+
+    16 nodes, EA L^2/A = 2e4, kT L/A = 0.02.
+    """
     rod, rods, energy = {**ROD, "nodes": 16, "stretching": 2e4}, 30, 0.02
     dt = longer * many(rod, 1, energy, "auto").step_length
     simulation = many(rod, rods, energy, dt)
@@ -224,7 +236,7 @@ def test_what_rings_is_what_the_variance_of_the_stiffest_motion_is_off_by(longer
         kicks_of(simulation).ringing,
     )
     assert ringing > least
-    assert np.mean(of_rods) == pytest.approx(1 - ringing, abs=3 * error + 0.3 * ringing)
+    assert np.mean(of_rods) == pytest.approx(1 - ringing, abs=3 * error + ringing**2)
 
 
 def test_held_unknowns_do_not_move_in_trials():
