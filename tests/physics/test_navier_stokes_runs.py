@@ -91,7 +91,7 @@ def test_hardly_any_inertia_is_stokes_flow_on_the_papers_grid():
         run(swimmer({**fluid, **grid}, stretching=400.0, end=period, step=period / 100))
         for fluid in (STOKES, inertial(1e-4))
     ]
-    assert rms(ends[1].shape.r - ends[0].shape.r) < 3e-5
+    assert rms(ends[1].configuration.r - ends[0].configuration.r) < 3e-5
 
 
 # --- steps that are tried again --------------------------------------------------------------------------------------
