@@ -57,7 +57,8 @@ def test_with_thermal_forces_a_quarter_turn_that_is_near_is_told() -> None:
     from helpers.thermal_scenes import scene as thermal
 
     def soon(energy: float) -> bool:
-        rod = {**SOFT, "nodes": 8, "twisting": 0.7, "curvature": [6.0, 0], "twist_rate": 6.0, "shape": {"kind": "relaxed"}}
+        helix = {"curvature": [6.0, 0], "twist_rate": 6.0, "shape": {"kind": "relaxed"}}
+        rod = {**SOFT, **helix, "nodes": 8, "twisting": 0.7}
         lines = warnings(Simulation(thermal({"rod": rod}, energy)))
         return any("soon a quarter turn apart" in line for line in lines)
 
