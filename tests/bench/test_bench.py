@@ -1,5 +1,6 @@
 """The benchmark's pieces run and give numbers; how fast they are is never tested."""
 
+import argparse
 import json
 import math
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import pytest
 
 from ibfil.bench import linked, many, parts, pieces, spaces, thermal, timing
+from ibfil.commands import bench
 from ibfil.errors import CaseError
 
 
@@ -66,3 +68,10 @@ def test_json_is_json(monkeypatch, capsys):
     monkeypatch.setattr(pieces, "swimmers", lambda: [row])
     assert parts.main(json=True) == 0
     assert json.loads(capsys.readouterr().out)[0]["ratio"] == 2.0
+
+
+def test_help_names_every_part():
+    command = argparse.ArgumentParser()
+    bench.add(command)
+    help_text = command.format_help()
+    assert all(part in help_text for part in parts.PARTS)
