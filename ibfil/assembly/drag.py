@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..case.schema import Case
     from ..fluids.calibrated_drag import Match
+    from ..fluids.resistive_bodies import BodyDrag
     from .stacked import RodStack
 
 
@@ -95,3 +96,14 @@ def drag(case: Case, stacked: RodStack) -> resistive_force.Drag:
     # A filament that does not twist has its turn held; any positive drag will do for the row.
     out.spin[out.spin == 0] = 1.0
     return out
+
+
+def body_drag(case: Case, stacked: RodStack) -> BodyDrag:
+    """The resistances of the bodies of a case, in their axes; none of a joint."""
+    from ..bodies.resistance import Resistance, ellipsoid
+    from ..fluids.resistive_bodies import BodyDrag
+
+    none = Resistance(np.zeros(3), np.zeros(3), np.zeros(3))
+    sizes = [np.array(body.shape.semi_axes) for body in case.bodies.values()]
+    found = [ellipsoid(size, case.fluid.viscosity) if size.any() else none for size in sizes]
+    return BodyDrag(*(np.array(column) for column in zip(*found, strict=True)), stacked.system.length)

@@ -28,15 +28,22 @@ def _turn(end) -> Turn | None:
 
 
 def prescribed_ends(
-    filaments: Sequence[Filament], nodes: Sequence[slice], ranges: Sequence[slice], unknowns: int
+    filaments: Sequence[Filament],
+    nodes: Sequence[slice],
+    ranges: Sequence[slice],
+    unknowns: int,
+    bodies_still: bool = False,
 ) -> tuple[PrescribedEnds, np.ndarray]:
-    """The held unknowns, and the mask (n,) of end nodes that carry no moment; ``ranges`` have phantom nodes too."""
+    """The held unknowns, and the mask (n,) of end nodes that carry no moment; ``ranges`` have phantom nodes too.
+
+    Ends in bodies are held among them only where ``bodies_still``: bodies carry them otherwise.
+    """
     held, free = [], np.zeros(ranges[-1].stop, bool)
     idle: list[int] = []
     for filament, where, every in zip(filaments, nodes, ranges, strict=True):
         for end, node in ((filament.start, where.start), (filament.finish, where.stop - 1)):
             free[node] = not end.clamped and not filament.closed
-            if end.held:
+            if end.held and (bodies_still or not end.attached):
                 moves = None if end.moves is None else triple(end.moves, "t")
                 held.append(PrescribedEnd(node, _turn(end), moves))
         if unknowns == 4 and filament.twisting is None:

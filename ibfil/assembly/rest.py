@@ -65,7 +65,7 @@ def _alone(filament: Filament, segmented: Segmented) -> tuple[RodSystem, Resisti
     filaments, s = [filament], segmented.s
     nodes, unknowns = [slice(0, len(s))], 3 if filament.twisting is None else 4
     mesh = stack([segmented])
-    ends, free = prescribed_ends(filaments, nodes, nodes, unknowns)
+    ends, free = prescribed_ends(filaments, nodes, nodes, unknowns, bodies_still=True)
     stretching = half(along(filaments, nodes, s, lambda f: f.stretching))
     law = laws.linear(filaments, nodes, s)
     system = rod_system(filament)(mesh, law, stretching, free, _Still(ends), [], unknowns, filament.length)

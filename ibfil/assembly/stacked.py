@@ -13,6 +13,7 @@ from ..rods.geometry import Configuration
 from ..rods.system import RodSystem
 
 if TYPE_CHECKING:
+    from ..bodies.system import RodsWithBodies
     from ..case.filament import Filament
     from ..rods.contact import Contact
     from ..rods.links.base import Link
@@ -23,17 +24,32 @@ TOGETHER = 500  # nodes of linked filaments that a preconditioner takes as one b
 
 @dataclass(frozen=True)
 class RodStack:
-    """The rods of a scene: names and node ranges of its filaments, arclength (n,), links, and all their mechanics."""
+    """The rods of a scene: names and node ranges of its filaments, arclength (n,), links, and all their mechanics.
+
+    Where there are ``bodies``, their rows come after the nodes in all arrays (bodies/rows.py).
+    """
 
     names: tuple[str, ...]
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
     ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
     s: np.ndarray
-    system: RodSystem
+    system: RodSystem | RodsWithBodies
     start: Configuration
     contact: Contact | NoContact
     links: tuple[Link, ...] = ()
+    bodies: tuple[str, ...] = ()
+    motors: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many nodes there are, copies beyond the ends of closed rods among them, rows of bodies left out."""
+        return self.ranges[-1].stop
+
+    @property
+    def nodes_at_start(self) -> Configuration:
+        """The configuration of the nodes alone at t = 0."""
+        return Configuration(self.start.table[: self.count])
 
     @cached_property
     def groups(self) -> tuple[tuple[slice, ...], ...]:
@@ -53,7 +69,10 @@ class RodStack:
     @cached_property
     def twists(self) -> np.ndarray:
         """Which nodes are of filaments that twist (n,): e1 of others may come to differ from node to node."""
-        return np.repeat([f.twisting is not None for f in self.filaments], [w.stop - w.start for w in self.ranges])
+        out = np.zeros(len(self.s), bool)
+        for filament, where in zip(self.filaments, self.ranges, strict=True):
+            out[where] = filament.twisting is not None
+        return out
 
     @property
     def linked(self) -> tuple[np.ndarray, np.ndarray]:

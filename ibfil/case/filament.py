@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field
 
+from .body import Motor
 from .expressions import Expression
 from .shape import AnyShape, Straight
 from .table import ORIGIN, ZERO, Table
@@ -93,9 +94,12 @@ class Spring(Table):
 class End(Table):
     """One end of a filament."""
 
-    end: Literal["free", "hinged", "clamped"] = Field(
-        "free", description="free (M = 0), hinged (r held, M = 0) or clamped (r, e3 held)"
+    end: Literal["free", "hinged", "clamped", "body"] = Field(
+        "free", description="free (M = 0), hinged (r held, M = 0), clamped (r, e3 held) or clamped into a body"
     )
+    body: str = Field("", description='the body it is attached to, with end = "body"')
+    hinged: bool = Field(False, description="in a body: held there, but free to turn (M = 0)")
+    motor: Motor | None = Field(None, description="turns the rod in its body; needs twisting")
     twist: Literal["held", "free"] = Field(
         "free", description="clamped only: e1 held or free; held by default at a clamped end"
     )
@@ -113,18 +117,30 @@ class End(Table):
 
     @property
     def held(self) -> bool:
-        """Whether the end's position is given."""
+        """Whether the end's position is given, or a body's."""
         return self.end != "free"
+
+    @property
+    def attached(self) -> bool:
+        """Whether it is in a body."""
+        return self.end == "body"
 
     @property
     def clamped(self) -> bool:
         """Whether the end's tangent is given, and it carries a moment."""
-        return self.end == "clamped"
+        return self.support == "clamped"
+
+    @property
+    def support(self) -> str:
+        """How it is supported: free, hinged or clamped, by the lab or by a body."""
+        if not self.attached:
+            return self.end
+        return "hinged" if self.hinged else "clamped"
 
     @property
     def turn_held(self) -> bool:
         """Whether e1 is given there, at rest or turning."""
-        return self.clamped and self.twist != "free"
+        return self.clamped and (self.attached or self.twist != "free")
 
     @property
     def body_frame(self) -> bool:

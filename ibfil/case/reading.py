@@ -184,7 +184,7 @@ def _without_names(filled: dict[str, Any]) -> Iterator[Fault]:
 
 def _bad_names(raw: dict[str, Any]) -> Iterator[Fault]:
     """Names of tables become names in files and paths of keys, so they are plain."""
-    for table in ("filament", "link", "observe", "expect"):
+    for table in ("filament", "body", "link", "observe", "expect"):
         entries = raw.get(table)
         for name in entries if isinstance(entries, dict) else ():
             if not _NAME.fullmatch(name):

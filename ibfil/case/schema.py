@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
+from .body import Body
 from .filament import Filament
 from .fluid import Contact, Fluid
 from .link import Link
@@ -114,6 +115,7 @@ class Scene(Table):
         examples=[{"name": {"length": 1.0, "nodes": 41, "bending": 1.0, "stretching": 1e4}}],
     )
     links: dict[str, Link] = Field({}, alias="link", description="one table a link between filaments")
+    bodies: dict[str, Body] = Field({}, alias="body", description="one table a body, which ends of filaments are in")
     contact: Contact | None = Field(None, description="absent: not looked for")
     fluid: Fluid = Field(description="the fluid", examples=[{"model": "rft", "viscosity": 1.0}])
     thermal: Thermal | None = Field(None, description="thermal noise, in rft and in stokes")

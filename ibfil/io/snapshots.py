@@ -49,11 +49,44 @@ class LinkSnapshot:
 
 
 @dataclass(frozen=True)
+class BodySnapshot:
+    """One body at one time, in the case's units and the lab frame."""
+
+    position: np.ndarray  # (3,) of its centre, unwrapped
+    axes: np.ndarray  # (3, 3) its axes, one a row
+    velocity: np.ndarray  # (3,) of its centre
+    rate: np.ndarray  # (3,) at which it turns
+    force: np.ndarray  # (3,) of the body itself on the fluid
+    torque: np.ndarray  # (3,) the same about its centre
+    reaction: np.ndarray | None = None  # (3,) force that holds or moves it; None where it is free
+    reaction_torque: np.ndarray | None = None  # (3,) the same, about its centre
+
+
+@dataclass(frozen=True)
+class MotorSnapshot:
+    """One motor at one time."""
+
+    angle: float  # turned since the start, the rod against the body
+    rate: float
+    torque: float  # of the body on the rod, about the axis
+
+    @property
+    def power(self) -> float:
+        """The power it puts into the scene."""
+        return self.torque * self.rate
+
+
+@dataclass(frozen=True)
 class Snapshot:
-    """All filaments at one time, with the diagnostics taken at outputs and the fields where they were asked for."""
+    """All filaments at one time, with the diagnostics taken at outputs and the fields where they were asked for.
+
+    Bodies go by their names; motors by the filament that they turn, NAME_start or NAME_finish.
+    """
 
     time: float
     filaments: dict[str, FilamentSnapshot]
     diagnostics: dict[str, float | np.ndarray]
     grid: dict[str, np.ndarray] | None = None
     links: dict[str, LinkSnapshot] = field(default_factory=dict)
+    bodies: dict[str, BodySnapshot] = field(default_factory=dict)
+    motors: dict[str, MotorSnapshot] = field(default_factory=dict)

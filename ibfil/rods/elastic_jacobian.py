@@ -278,3 +278,17 @@ def stiffness(
         _twist_fluxes(mesh.joined, mesh.ds, *what, moment.twist, moment.twist_slope, start.table, flux[1:])
         _twist_sources(mesh, *what, start.table, by_node)
     _stiffness(mesh.joined, mesh.ds, stencils, *what, stretching, start.table, least, flux, matrix)
+
+
+def through_stencils(
+    mesh: Mesh, stencils: Stencils, g: Configuration, start: Configuration, moment: Moment, matrix: np.ndarray
+) -> None:
+    """Adds the part of it that goes through r' and r'', by any stencils of these, to ``matrix`` (n, m, (2 w + 1) m)."""
+    n, m, columns = matrix.shape
+    flux, by_node = np.zeros((n + 1, 2, m, 7)), matrix.reshape(n, m, columns // m, m)
+    what = g.table, moment.bend, moment.bend_slope
+    if m == 4:
+        _twist_fluxes(mesh.joined, mesh.ds, *what, moment.twist, moment.twist_slope, start.table, flux[1:])
+        _twist_sources(mesh, *what, start.table, by_node)
+    _bending_fluxes(mesh.joined, mesh.ds, *what, start.table, flux[1:])
+    _rows(stencils, flux, by_node)

@@ -135,14 +135,36 @@ class RodSystem:
         elastic_jacobian.stiffness(
             self.mesh, self._stencils, configuration, start, moment, self.stretching, least, matrix
         )
-        return self._loaded(Linearization(self.mesh, configuration, start, matrix, least == 0.0), time)
+        linearization = Linearization(self.mesh, configuration, start, matrix, least == 0.0)
+        return self._loaded(linearization, time)
 
     def _loaded(self, linearization: Linearization, time: float) -> Stiffness:
         """The stiffness with the terms that the kernels leave out: nonlocal twist, and the loads."""
+        self.add_nonlocal_twist(linearization)
+        self.add_loads(linearization, time)
+        return linearization.stiffness
+
+    def add_nonlocal_twist(self, linearization: Linearization) -> None:
+        """Adds the term of the law that the kernels leave out."""
         if self.law.nonlocal_twist is not None:
             linearization.nonlocal_twist(self._unit_responses(linearization.configuration), self.law.nonlocal_twist)
+
+    def add_loads(self, linearization: Linearization, time: float) -> None:
+        """Adds how the loads change."""
         for load in self.loads:
             load.add_stiffness(time, linearization)
+
+    def external(self, configuration: Configuration, time: float) -> np.ndarray:
+        """The loads on each node (n, m)."""
+        force = np.zeros((len(configuration.table), self.unknowns))
+        for load in self.loads:
+            load.add_force(configuration, time, force)
+        return force
+
+    def external_stiffness(self, configuration: Configuration, start: Configuration, time: float) -> Stiffness:
+        """The Jacobian of ``external``."""
+        linearization = Linearization(self.mesh, configuration, start, np.zeros(self._matrix_shape))
+        self.add_loads(linearization, time)
         return linearization.stiffness
 
     def begin(self, tau: float, w: float) -> None:
@@ -168,3 +190,7 @@ class RodSystem:
     def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""
         return Prescribed(self.ends.index, self.ends.motion(before, after))
+
+    def bodies(self, there: Configuration) -> None:
+        """None: there are none."""
+        return None

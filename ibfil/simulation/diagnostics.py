@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..io.snapshots import FilamentSnapshot, LinkSnapshot, Snapshot
+from ..io.snapshots import BodySnapshot, FilamentSnapshot, LinkSnapshot, MotorSnapshot, Snapshot
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..fluids.output import FluidOutput
+    from ..rods.geometry import Configuration
     from ..timestepping.base import State
     from .model import Model
 
@@ -26,6 +27,7 @@ class SolvedState(NamedTuple):
     reaction: np.ndarray
     iterations: int
     shortened: int
+    there: Configuration  # at which the fluid was asked
 
 
 class Diagnostics:
@@ -67,7 +69,16 @@ class Diagnostics:
         for link in self._rods.links:
             seen = link.seen(configuration, now.state.time)
             links[link.name] = LinkSnapshot(seen.first, seen.second, seen.force, **seen.parts)
-        return Snapshot(now.state.time, filaments, self._of_all(now), grid, links)
+        return Snapshot(now.state.time, filaments, self._of_all(now), grid, links, *self._bodies(now))
+
+    def _bodies(self, now: SolvedState) -> tuple[dict[str, BodySnapshot], dict[str, MotorSnapshot]]:
+        """The bodies and motors by name."""
+        if not self._rods.bodies:
+            return {}, {}
+        from . import of_bodies
+
+        known = self._rods, self._mechanics, now
+        return of_bodies.bodies(*known), of_bodies.motors(*known)
 
     def _twisting(self, filament: Filament, now: SolvedState, where: slice) -> dict[str, np.ndarray]:
         """The twist torque and the spin (N, 3) of a filament that twists, by name."""
@@ -87,10 +98,12 @@ class Diagnostics:
         """Moment and strain (n, 3) at nodes: the third component is the mean of the half nodes beside it."""
         configuration, mesh = state.configuration, self._mechanics.mesh
         moment = self._mechanics.moment(configuration, state.time)
-        beside = mesh.joined.astype(float) + np.append(False, mesh.joined[:-1])
+        n = self._rods.count
+        joined = mesh.joined[:n]
+        beside = joined.astype(float) + np.append(False, joined[:-1])
         thirds = []
-        for half in (moment.twist, configuration.twist):
-            half = np.where(mesh.joined, half, 0.0)
+        for half in (moment.twist, configuration.twist[:n]):
+            half = np.where(joined, half, 0.0)
             nodal = (half + np.append(0.0, half[:-1])) / np.maximum(beside, 1.0)
             for first, last in self._mechanics.closures:
                 nodal[[first, last]] = 0.5 * (nodal[first] + nodal[last])
@@ -101,17 +114,15 @@ class Diagnostics:
             if given is not None:  # the law's own is zero there
                 i, vector = given
                 nodal[i] = np.stack([configuration.e1[i], configuration.e2[i], configuration.e3[i]]) @ vector
-        return nodal, np.column_stack([configuration.bend, thirds[1]])
+        return nodal, np.column_stack([configuration.bend[:n], thirds[1]])
 
     def _of_all(self, now: SolvedState) -> dict[str, float | np.ndarray]:
         """The diagnostics of all filaments together, by name."""
         configuration, mesh, force = now.state.configuration, self._mechanics.mesh, now.force
         stretch = (configuration.length / mesh.ds)[mesh.joined] - 1.0
-        torque = np.cross(configuration.r, force[:, :3]).sum(axis=0)
-        if force.shape[1] == 4:
-            torque = torque + (force[:, 3:] * configuration.e3).sum(axis=0)
+        net, torque = self._wrench(now)
         out: dict[str, float | np.ndarray] = {
-            "net_force": force[:, :3].sum(axis=0),
+            "net_force": net,
             "net_torque": torque,
             "stretch_max": float(stretch.max()),
             "stretch_min": float(stretch.min()),
@@ -129,6 +140,18 @@ class Diagnostics:
         if case.dissipation_observed:
             out |= self._dissipation(now)
         return out | self._rods.contact.diagnostics(configuration.r)
+
+    def _wrench(self, now: SolvedState) -> tuple[np.ndarray, np.ndarray]:
+        """Total force and torque (3,) on the fluid."""
+        configuration, force = now.state.configuration, now.force
+        if self._rods.bodies:
+            from .of_bodies import wrench
+
+            return wrench(self._mechanics, now)
+        torque = np.cross(configuration.r, force[:, :3]).sum(axis=0)
+        if force.shape[1] == 4:
+            torque = torque + (force[:, 3:] * configuration.e3).sum(axis=0)
+        return force[:, :3].sum(axis=0), torque
 
     def _dissipation(self, now: SolvedState) -> dict[str, float | np.ndarray]:
         """The heat of the fluid, that of its couple across the rods included, and what else it knows of power."""

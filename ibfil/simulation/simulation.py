@@ -52,6 +52,7 @@ class Simulation:
         self.notices: list[str] = []  # what has happened and nobody was told yet
         self._told = self._grown = False  # that the fluid moves too far in a step; that a disturbance grows too fast
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._there = self.start  # where the fluid was asked for them; kept up with where there are bodies
         self.drivers = Drivers(self.model)
         self.choice = steps.choose(self.model, self.drivers)
         self._control = self.choice.control
@@ -222,6 +223,7 @@ class Simulation:
         self._look_at_crossing(time - before.time)
         self._look_at_growth(time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
+        self._there = step.there or self._there
         if self.steps > self.case.time.max_steps:
             limits = self.case.time
             self._fail(failures.too_many(self.steps, limits.max_steps, limits.end, time - before.time))
@@ -310,16 +312,19 @@ class Simulation:
 
     def _pushed(self, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same, of the forces of this moment alone, over a time dt."""
-        force, _ = self.system.forces(self.state_now.configuration, self.time)
-        held = self.system.held(self.time, self.time + dt)
         now = self.state_now.configuration
+        force, inner = self.system.forces(now, self.time)
+        held, bodies = self.system.held(self.time, self.time + dt), self.system.bodies(now)
+        if bodies is not None:
+            held = bodies.carried(held, now, now, inner, self.time, np.zeros_like(force))
         answer = self.fluid.response(now.r, now.e3, self.time, dt).forced(force, held, np.zeros_like(force))
         return answer.move / dt, answer.force, answer.reaction
 
     def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments now, with diagnostics; velocities and forces are those of the step here, or of the first."""
         with self._alone():
-            now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened)
+            there = self._there if self.rods.bodies else self.configuration
+            now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened, there)
             return self._diagnostics.snapshot(now, fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
@@ -345,6 +350,7 @@ class Simulation:
             **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
             **{f"rods_{key}": value for key, value in self.system.memory().items()},
             **self.rods.contact.state(),
+            **({"there": self._there.table} if self.rods.bodies else {}),
             **({"laws": self._laws} if self._laws else {}),
         }
 
@@ -372,6 +378,8 @@ class Simulation:
             self.fluid.recall(memory)
         self.system.recall({k.removeprefix("rods_"): v for k, v in known.items() if k.startswith("rods_")})
         self.rods.contact.restore(known)
+        if self.rods.bodies:
+            self._there = Configuration(array["there"])
 
     def _same_start(self, began: np.ndarray) -> None:
         """Clamps and tethers hold the start shape, so it must be the one the run began with."""

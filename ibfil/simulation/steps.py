@@ -133,7 +133,8 @@ class StepLimits:
         self._points = POINTS_BY_ERROR if by_error else POINTS_A_PERIOD
         self._steady = not by_error  # whether a steady spin counts, which an error can tell
         self._points_of_growth = GROWTH_BY_ERROR if by_error else POINTS_A_PERIOD
-        self.growth = GrowthWatch(model) if may_grow(model) and not time.explicit else None
+        watched = may_grow(model) and not time.explicit and not model.rods.bodies
+        self.growth = GrowthWatch(model) if watched else None
         self.breaks = Breaks(drivers.jumps, time.end)
 
     def longest(self, state: State, steps: int, length: float) -> float:

@@ -42,9 +42,9 @@ def load_rate(model: Model, drivers: Drivers) -> float:
     drag = {id(filament): model.fluid_model.drag(filament) * filament.length**2 for filament in rods.filaments}
     mass = {id(filament): 2 * mean_mass(filament) * filament.length**2 for filament in rods.filaments}
     for time in _some(drivers):
-        force = np.zeros((len(rods.s), rods.system.unknowns))
+        force = np.zeros((rods.count, rods.system.unknowns))
         for load in loads:
-            load.add_force(rods.start, time, force)
+            load.add_force(rods.nodes_at_start, time, force)
         size = np.linalg.norm(force[:, :3], axis=1)
         velocity = None if flow is None else flow(rods.start.r, time)
         for filament, where in zip(rods.filaments, rods.nodes, strict=True):
@@ -82,7 +82,7 @@ def slowest_bending(model: Model) -> float:
 
 
 def _slowest(filament: Filament, drag: float) -> float:
-    own = bending_time(drag, filament.length, softest(filament), filament.start.end, filament.finish.end)
+    own = bending_time(drag, filament.length, softest(filament), filament.start.support, filament.finish.support)
     return own if filament.mass is None else float(1.0 / np.min(np.abs(bending_roots(filament, drag))))
 
 
@@ -95,7 +95,7 @@ def mean_mass(filament: Filament) -> float:
 
 def bending_roots(filament: Filament, drag: float) -> np.ndarray:
     """The rates s (2,) of the slowest bending of a filament with mass, m s^2 + zeta s + zeta/(its bending time) = 0."""
-    own = bending_time(drag, filament.length, softest(filament), filament.start.end, filament.finish.end)
+    own = bending_time(drag, filament.length, softest(filament), filament.start.support, filament.finish.support)
     return np.roots([mean_mass(filament), drag, drag / own])
 
 

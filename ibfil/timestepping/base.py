@@ -36,6 +36,7 @@ class Step(NamedTuple):
     """A finished step: the new state, the nodes' velocities, the force the fluid felt, reactions, iterations.
 
     ``response`` is the fluid's that it was solved with: what a fluid that remembers is told when the step is taken.
+    ``there`` is the geometry at which it was asked, where bodies balance; None where there are none.
     """
 
     state: State
@@ -44,6 +45,22 @@ class Step(NamedTuple):
     reaction: np.ndarray  # (n, m)
     iterations: int
     response: Response
+    there: Configuration | None = None
+
+
+class Bodies(Protocol):
+    """The bodies of a scene over a step."""
+
+    def carried(
+        self,
+        held: Prescribed,
+        start: Configuration,
+        configuration: Configuration,
+        moment: Any,
+        time: float,
+        y: np.ndarray,
+    ) -> Prescribed:
+        """``held`` with what bodies carry at ``configuration``, y from ``start``, ``moment`` as ``forces`` gave it."""
 
 
 class System(Protocol):
@@ -76,6 +93,9 @@ class System(Protocol):
 
     def held(self, before: float, after: float) -> Prescribed:
         """The prescribed displacements between two times."""
+
+    def bodies(self, there: Configuration) -> Bodies | None:
+        """The bodies over a step whose fluid is asked at the geometry ``there``; None where there are none."""
 
 
 StiffnessOf = Callable[[Configuration, Configuration, Any, float], Stiffness]  # one of the two of the rods

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -11,7 +11,7 @@ from numba import njit
 from ..fluids.base import Fluid, Response, Solution
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
-from .base import FAILURES, NotConverged, State, Step, StiffnessOf, System, _finish
+from .base import FAILURES, Bodies, NotConverged, State, Step, StiffnessOf, System, _finish
 
 
 @njit(cache=True)
@@ -35,12 +35,19 @@ class _Equation(NamedTuple):
     time: float
     target: np.ndarray  # (n, m)
     held: Prescribed
+    bodies: Bodies | None
+
+    def prescribed(self, y: np.ndarray, configuration: Configuration, inner: Any) -> Prescribed:
+        """The held unknowns, and those that bodies carry, at ``configuration``, y away from the start."""
+        if self.bodies is None:
+            return self.held
+        return self.bodies.carried(self.held, self.start, configuration, inner, self.time, y)
 
     def correction(self, y: np.ndarray, configuration: Configuration, stiffness: StiffnessOf) -> tuple[Solution, float]:
         """Newton's correction of y, with the exact or the definite ``stiffness`` of the system, and its size."""
         force, inner = self.system.forces(configuration, self.time)
         matrix = stiffness(configuration, self.start, inner, self.time)
-        answer = self.response.implicit(force, matrix, self.held, y, self.target)
+        answer = self.response.implicit(force, matrix, self.prescribed(y, configuration, inner), y, self.target)
         return answer, _size(answer.move, self.system.length)
 
 
@@ -87,9 +94,11 @@ class Implicit:
             after,
             target,
             system.held(state.time, after),
+            system.bodies(there),
         )
         y, answer, count = self._solve(equation, ahead, there)
-        return _finish(system, state, dt, y, (y - target) / tau, answer, count, equation.response)
+        step = _finish(system, state, dt, y, (y - target) / tau, answer, count, equation.response)
+        return step if equation.bodies is None else step._replace(there=there)
 
     def amplification(self, z: np.ndarray) -> np.ndarray:
         """The factor by which an even step takes a mode exp(lam t), z = lam dt: of BDF2 that of the larger root."""
@@ -127,7 +136,8 @@ class Implicit:
             if fresh:
                 matrix = system.stiffness(configuration, equation.start, inner, equation.time)
                 exact += 1
-            answer = equation.response.implicit(force, matrix, equation.held, y, equation.target)
+            held = equation.prescribed(y, configuration, inner)
+            answer = equation.response.implicit(force, matrix, held, y, equation.target)
             size = _size(answer.move, system.length)
             rate = size / max(last, self.tolerance)
             if not rate < (0.25 if fresh and before else 1.0):

@@ -125,6 +125,9 @@ class SteadyRods:
         """Held unknowns do not move."""
         return self._held
 
+    def bodies(self, there: Configuration) -> None:
+        """None: scenes with bodies are not asked for their rest."""
+
 
 # --- the frame of a scene ---------------------------------------------------------------------------------------------
 

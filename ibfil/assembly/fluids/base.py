@@ -133,11 +133,18 @@ class FluidModel(ABC):
 
     def local_fluid(self, rods: RodStack) -> ResistiveForce:
         """The fluid of that drag, in the background flow."""
-        from ...fluids.resistive_force import ResistiveForce
+        from ...fluids.resistive_force import Drag, ResistiveForce
 
         mesh, twists = rods.system.mesh, rods.twists.astype(float) if rods.system.unknowns == 4 else None
         spacing = float(np.min(mesh.ds[mesh.joined]))
-        return ResistiveForce(self.local_drag(rods), rods.system.profile, self.flow, twists, spacing)
+        if not rods.bodies:
+            return ResistiveForce(self.local_drag(rods), rods.system.profile, self.flow, twists, spacing)
+        from ...fluids.resistive_bodies import ResistiveWithBodies
+        from ..drag import body_drag
+
+        own = Drag(*(each[: rods.count] for each in self.local_drag(rods)))
+        twists = None if twists is None else twists[: rods.count]
+        return ResistiveWithBodies(body_drag(self.case, rods), own, rods.system.profile, self.flow, twists, spacing)
 
     def automatic_limit(self, longest: float) -> float:
         """The longest automatic step, given the ``longest`` that the fluid's own motion allows."""

@@ -1,0 +1,133 @@
+"""From the [body] tables of a case to bodies, motors, and the ends of rods in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..bodies.body import Attachment, Body, Motor, OfTime
+from ..bodies.system import RodsWithBodies
+from ..rods.boundary_conditions import spinning, steady, turned
+from .loads import number, triple
+
+if TYPE_CHECKING:
+    from ..case import body as tables
+    from ..case.filament import End, Filament
+    from ..case.schema import Case
+    from ..rods.geometry import Configuration
+    from ..rods.system import RodSystem
+
+
+class InBody(NamedTuple):
+    """An end of a rod in a body: its table, whether it is at s = L, its node, all nodes of the rod, and if it twists."""
+
+    end: End
+    finish: bool
+    node: int
+    where: slice
+    twists: bool
+
+
+def attached_ends(filaments: Sequence[Filament], nodes: Sequence[slice]) -> list[InBody]:
+    """The ends that are in bodies."""
+    out = []
+    for filament, where in zip(filaments, nodes, strict=True):
+        for finish, (end, node) in enumerate(((filament.start, where.start), (filament.finish, where.stop - 1))):
+            if end.attached:
+                out.append(InBody(end, bool(finish), node, where, filament.twisting is not None))
+    return out
+
+
+def motor_names(names: Sequence[str], filaments: Sequence[Filament]) -> tuple[str, ...]:
+    """The names of motors: NAME_start, NAME_finish by the end of the filament that each turns."""
+    ends = [
+        (f"{name}_{side}", getattr(f, side))
+        for name, f in zip(names, filaments, strict=True)
+        for side in ("start", "finish")
+    ]
+    return tuple(name for name, end in ends if end.attached and end.motor is not None)
+
+
+def with_bodies(
+    case: Case, rods: RodSystem, begin: Configuration, filaments: Sequence[Filament], nodes: Sequence[slice]
+) -> RodsWithBodies:
+    """The system of these rods, which start as ``begin``, with the bodies of the case."""
+    names, ends = list(case.bodies), attached_ends(filaments, nodes)
+    bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.bodies.items()]
+    motors, driven, attachments = [], [], []
+    for at in ends:
+        number_of = names.index(at.end.body)
+        body, motor = bodies[number_of], -1
+        if at.end.motor is not None:
+            motor = len(motors)
+            motors.append(_motor(at.end.motor, number_of, body, begin, at))
+            driven.append(np.arange(at.where.start, at.where.stop))
+        attachments.append(_attachment(at, number_of, motor, body, begin, rods.unknowns))
+    parts = [[np.arange(e.where.start, e.where.stop) for e in ends if e.end.body == name] for name in names]
+    own = [np.unique(np.concatenate([np.zeros(0, np.int64), *some])) for some in parts]
+    return RodsWithBodies(rods, bodies, motors, attachments, own, driven)
+
+
+def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> Body:
+    """One body as it begins."""
+    x = np.array(table.axes[0]) / np.linalg.norm(table.axes[0])
+    y = np.array(table.axes[1]) - (np.array(table.axes[1]) @ x) * x
+    y /= np.linalg.norm(y)
+    axes = np.column_stack([x, y, np.cross(x, y)])
+    given = table.given_motion
+    return Body(
+        centre(table, axes, ends, begin),
+        axes,
+        None if given is None else triple(given.moves, "t"),
+        None if given is None else triple(given.turns, "t"),
+        _of_time(table.force),
+        _of_time(table.torque),
+        table.own_axes,
+    )
+
+
+def centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration) -> np.ndarray:
+    """The centre (3,): as given, or such that the first end is on the surface, the centre behind its tangent."""
+    if table.position is not None or not ends:
+        return np.array(table.position or (0.0, 0.0, 0.0))
+    first, size = ends[0], np.array(table.shape.semi_axes)
+    out = begin.e3[first.node] * (-1.0 if first.finish else 1.0)  # from the body into the rod
+    if not size.any():
+        return begin.r[first.node].copy()
+    return begin.r[first.node] - out / np.linalg.norm((out @ axes) / size)
+
+
+def _of_time(given) -> OfTime | None:
+    return None if given is None else triple(given, "t")
+
+
+def _motor(table: tables.Motor, number_of: int, body: Body, begin: Configuration, at: InBody) -> Motor:
+    """One motor."""
+    if isinstance(table.axis, str):
+        axis, point = begin.e3[at.node] @ body.axes, (begin.r[at.node] - body.centre) @ body.axes
+    else:
+        axis, point = np.array(table.axis) / np.linalg.norm(table.axis), np.zeros(3)
+    if table.stall is not None:
+        assert table.free is not None
+        stall = table.stall
+        return Motor(number_of, axis, point, None, lambda t: stall, stall / table.free)
+    if table.torque is not None:
+        return Motor(number_of, axis, point, None, number(table.torque))
+    return Motor(number_of, axis, point, _angle(table))
+
+
+def _angle(table: tables.Motor) -> Callable[[float, float], float]:
+    """The angle that a motor of a given rate or angle turns between two times."""
+    if table.angle is not None:
+        return turned(number(table.angle))
+    assert table.spin is not None
+    return steady(table.spin.constant) if table.spin.constant is not None else spinning(number(table.spin))
+
+
+def _attachment(at: InBody, body: int, motor: int, of: Body, begin: Configuration, unknowns: int) -> Attachment:
+    """The end in body axes."""
+    tangent = begin.e3[at.node] @ of.axes if at.end.clamped else None
+    director = begin.e1[at.node] @ of.axes if at.end.clamped and at.twists and unknowns == 4 else None
+    return Attachment(at.node, body, motor, (begin.r[at.node] - of.centre) @ of.axes, tangent, director)

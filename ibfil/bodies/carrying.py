@@ -1,0 +1,122 @@
+"""What bodies carry in one step: the ends of rods, and the balances that their own unknowns obey."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..linalg.constraints import Carried, Prescribed
+from ..rods.elastic_force import Moment
+from ..rods.geometry import Configuration
+from ..rods.loads import cross_matrix
+from .attached import levers, place, turn_of
+from .balance import balance
+from .body import Poses
+from .rotation import turning
+
+if TYPE_CHECKING:
+    from .system import RodsWithBodies
+
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+class Carrying:
+    """The bodies of a system over a step whose fluid is asked at the geometry ``there``."""
+
+    def __init__(self, system: RodsWithBodies, there: Configuration) -> None:
+        self.system, self.rows, self.q = system, system.rows, system.rows.q
+        rods, poses = self.rows.rods(there), self.rows.poses(there)
+        known = system.nodes, system.driven, system.motors
+        self.balance = balance(rods, poses, *known, self.q, self.rows.m)
+
+    def carried(
+        self,
+        held: Prescribed,
+        start: Configuration,
+        configuration: Configuration,
+        moment: Moment,
+        time: float,
+        y: np.ndarray,
+    ) -> Prescribed:
+        """``held`` with what bodies carry at ``configuration``, y (N, m) from ``start``, in the step to ``time``."""
+        rods, begin, poses = self.rows.rods(configuration), self.rows.rods(start), self.rows.poses(configuration)
+        turns = self.rows.turns(y)
+        value, lever, tangents = self._ends(begin, poses, turns, y)
+        external, change, external_columns = self._external(rods, begin, time, tangents)
+        follow = Carried(
+            self.system.at,
+            value,
+            lever,
+            self.rows.by,
+            self._elastic(rods, begin, moment, tangents) + external_columns,
+            self.balance,
+            external,
+            change,
+            external_columns,
+            *self._pushed(poses, turns, time),
+        )
+        return held._replace(carried=follow)
+
+    def _ends(
+        self, begin: Configuration, poses: Poses, turns: np.ndarray, y: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+        """How far carried unknowns are off (k,), their levers (k, p), and those of the tangents of clamps (3, p)."""
+        value, lever, tangents = [np.zeros(0)], [np.zeros((0, self.q.count))], []
+        for end in self.system.attached:
+            at = place(end, self.system.motors, poses)
+            by = levers(end, self.system.motors, poses, turns, begin, self.q)
+            value.append(at.r - begin.r[end.node] - y[end.node, :3])
+            lever.append(by.r)
+            if at.tangent is not None:
+                tangents.append(by.tangent)
+            if at.e1 is not None:
+                value.append(np.array([turn_of(begin, end.node, at) - y[end.node, 3]]))
+                lever.append(by.turn[None])
+        return np.concatenate(value), np.concatenate(lever), tangents
+
+    def _elastic(
+        self, rods: Configuration, begin: Configuration, moment: Moment, tangents: Sequence[np.ndarray]
+    ) -> np.ndarray:
+        """How elastic forces follow q through the tangents of clamps (n, m, p)."""
+        system = self.system
+        filled = system.tangents.begin(rods, begin, self.rows.m)
+        system.tangents.elastic(filled, moment)
+        system.rods.add_nonlocal_twist(filled)
+        return self._through(system.tangents.of(filled), tangents)
+
+    def _external(
+        self, rods: Configuration, begin: Configuration, time: float, tangents: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, Change | None, np.ndarray]:
+        """The loads on the nodes (n, m), how they change with these, and with q through tangents (n, m, p)."""
+        shape, system = (self.rows.n, self.rows.m), self.system
+        if not system.rods.loads:
+            return np.zeros(shape), None, np.zeros((*shape, self.q.count))
+        change = system.rods.external_stiffness(rods, begin, time).times
+        filled = system.tangents.begin(rods, begin, self.rows.m)
+        system.rods.add_loads(filled, time)
+        return system.rods.external(rods, time), change, self._through(system.tangents.of(filled), tangents)
+
+    def _through(self, forces: Sequence[np.ndarray], tangents: Sequence[np.ndarray]) -> np.ndarray:
+        """The forces (n, m, p) by q, from those by the tangents (n, m, 3) and the tangents' levers (3, p)."""
+        out = np.zeros((self.rows.n, self.rows.m, self.q.count))
+        for force, tangent in zip(forces, tangents, strict=True):
+            out += force @ tangent
+        return out
+
+    def _pushed(self, poses: Poses, turns: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the balances are to add up to (p,), how that follows q (p, p), and the drag of motors (p,)."""
+        q = self.q
+        want, slope, drag = np.zeros(q.count), np.zeros((q.count, q.count)), np.zeros(q.count)
+        for b, body in enumerate(self.rows.bodies):
+            force, torque = body.pushed(poses.axes[b], time)
+            want[q.moves(b)], want[q.turns(b)] = force, torque / q.length
+            if body.own_axes:
+                turn = turning(turns[b]) / q.length
+                slope[q.moves(b), q.turns(b)] = -cross_matrix(force) @ turn
+                slope[q.turns(b), q.turns(b)] = -cross_matrix(torque) @ turn / q.length
+        for k, motor in enumerate(self.system.motors):
+            if motor.torque is not None:
+                want[q.motor(k)], drag[q.motor(k)] = motor.torque(time) / q.length, motor.drag / q.length**2
+        return want, slope, drag
