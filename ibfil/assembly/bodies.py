@@ -13,15 +13,17 @@ from ..rods.boundary_conditions import spinning, steady, turned
 from .loads import number, triple
 
 if TYPE_CHECKING:
-    from ..case import body as tables
-    from ..case.filament import End, Filament
+    from ..case.bodies import body as tables
+    from ..case.bodies.end import End
+    from ..case.bodies.motor import Motor as MotorTable
+    from ..case.filament import Filament
     from ..case.schema import Case
     from ..rods.geometry import Configuration
     from ..rods.system import RodSystem
 
 
 class InBody(NamedTuple):
-    """An end of a rod in a body: its table, whether it is at s = L, its node, all nodes of the rod, and if it twists."""
+    """An end of a rod in a body: its table, whether it is at s = L, its node, the rod's nodes, and if that twists."""
 
     end: End
     finish: bool
@@ -56,7 +58,8 @@ def with_bodies(
     """The system of these rods, which start as ``begin``, with the bodies of the case."""
     names, ends = list(case.bodies), attached_ends(filaments, nodes)
     bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.bodies.items()]
-    motors, driven, attachments = [], [], []
+    motors: list[Motor] = []
+    driven, attachments = [], []
     for at in ends:
         number_of = names.index(at.end.body)
         body, motor = bodies[number_of], -1
@@ -103,7 +106,7 @@ def _of_time(given) -> OfTime | None:
     return None if given is None else triple(given, "t")
 
 
-def _motor(table: tables.Motor, number_of: int, body: Body, begin: Configuration, at: InBody) -> Motor:
+def _motor(table: MotorTable, number_of: int, body: Body, begin: Configuration, at: InBody) -> Motor:
     """One motor."""
     if isinstance(table.axis, str):
         axis, point = begin.e3[at.node] @ body.axes, (begin.r[at.node] - body.centre) @ body.axes
@@ -118,7 +121,7 @@ def _motor(table: tables.Motor, number_of: int, body: Body, begin: Configuration
     return Motor(number_of, axis, point, _angle(table))
 
 
-def _angle(table: tables.Motor) -> Callable[[float, float], float]:
+def _angle(table: MotorTable) -> Callable[[float, float], float]:
     """The angle that a motor of a given rate or angle turns between two times."""
     if table.angle is not None:
         return turned(number(table.angle))

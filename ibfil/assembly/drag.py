@@ -106,4 +106,5 @@ def body_drag(case: Case, stacked: RodStack) -> BodyDrag:
     none = Resistance(np.zeros(3), np.zeros(3), np.zeros(3))
     sizes = [np.array(body.shape.semi_axes) for body in case.bodies.values()]
     found = [ellipsoid(size, case.fluid.viscosity) if size.any() else none for size in sizes]
-    return BodyDrag(*(np.array(column) for column in zip(*found, strict=True)), stacked.system.length)
+    moved, turned, axes = (np.array(column) for column in zip(*found, strict=True))
+    return BodyDrag(moved, turned, axes, stacked.system.length)

@@ -14,8 +14,9 @@ from ..rods.loads import ActiveMoment, BodyForce, DeadForce, EndMoment, Follower
 from ..rods.mesh import Mesh
 
 if TYPE_CHECKING:
+    from ..case.bodies.end import End
     from ..case.expressions import Expression
-    from ..case.filament import End, Filament
+    from ..case.filament import Filament
     from ..rods.base import Load
 
 

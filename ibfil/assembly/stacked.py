@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class RodStack:
     nodes: tuple[slice, ...]
     ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
     s: np.ndarray
-    system: RodSystem | RodsWithBodies
+    system: RodSystem
     start: Configuration
     contact: Contact | NoContact
     links: tuple[Link, ...] = ()
@@ -45,6 +45,11 @@ class RodStack:
     def count(self) -> int:
         """How many nodes there are, copies beyond the ends of closed rods among them, rows of bodies left out."""
         return self.ranges[-1].stop
+
+    @property
+    def with_bodies(self) -> RodsWithBodies:
+        """The system, where there are bodies."""
+        return cast("RodsWithBodies", self.system)
 
     @property
     def nodes_at_start(self) -> Configuration:

@@ -47,7 +47,8 @@ def place(end: Attachment, motors: Sequence[Motor], poses: Poses) -> Place:
 
 def turn_of(start: Configuration, node: int, to: Place) -> float:
     """phi: the angle by which e1 is turned about the tangent after it was carried (Eq. 41) from ``start``."""
-    assert to.tangent is not None and to.e1 is not None
+    assert to.tangent is not None
+    assert to.e1 is not None
     e1, e3, t = start.e1[node], start.e3[node], to.tangent
     v = e1 - (e1 @ t) / (1.0 + e3 @ t) * (e3 + t)
     return float(np.arctan2(cross(v, to.e1) @ t, v @ to.e1))
@@ -69,7 +70,7 @@ class Unknowns(NamedTuple):
     length: float
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """p."""
         return 6 * self.bodies + self.motors
 
@@ -91,8 +92,8 @@ def levers(
 ) -> Levers:
     """The levers of an end; ``turns`` (b, 3) are the bodies' rotation vectors over the step."""
     at = place(end, motors, poses)
-    b, dw = end.body, np.zeros((3, q.count))
-    r, centre = np.zeros((3, q.count)), poses.centre[end.body]
+    b, dw = end.body, np.zeros((3, q.size))
+    r, centre = np.zeros((3, q.size)), poses.centre[end.body]
     dw[:, q.turns(b)] = turning(turns[b]) / q.length
     r[:, q.moves(b)] = np.eye(3)
     r[:, q.turns(b)] = -cross_matrix(at.r - centre) @ dw[:, q.turns(b)]
@@ -101,7 +102,7 @@ def levers(
         dw[:, k] = poses.axes[b] @ motor.axis / q.length
         r[:, k] = cross(dw[:, k], at.r - centre - poses.axes[b] @ motor.point)
     if at.tangent is None:
-        return Levers(r, np.zeros_like(r), np.zeros(q.count))
+        return Levers(r, np.zeros_like(r), np.zeros(q.size))
     t, old = at.tangent, start.e3[end.node]
     turn = cross(t, old) / (1.0 + old @ t)
     return Levers(r, -cross_matrix(t) @ dw, (t - cross(t, turn)) @ dw)

@@ -32,7 +32,7 @@ def balance(
     ``nodes`` are those of each body's rods, ``turned`` those of each motor's rod.
     """
     n = len(there.r)
-    out = np.zeros((q.count, n, m))
+    out = np.zeros((q.size, n, m))
     for b, (centre, at) in enumerate(zip(poses.centre, nodes, strict=True)):
         for c in range(3):
             out[6 * b + c, at, c] = 1.0
@@ -42,7 +42,7 @@ def balance(
         point = poses.centre[motor.body] + axes @ motor.point
         about = np.tensordot(axes @ motor.axis, _torques(there, at, point, m), 1)
         out[q.motor(k), at] = about / q.length
-    return out.reshape(q.count, n * m)
+    return out.reshape(q.size, n * m)
 
 
 def _torques(there: Configuration, at: np.ndarray, centre: np.ndarray, m: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,24 +11,36 @@ from ..linalg.constraints import Carried, Prescribed
 from ..rods.elastic_force import Moment
 from ..rods.geometry import Configuration
 from ..rods.loads import cross_matrix
+from ..rods.system import RodSystem
 from .attached import levers, place, turn_of
 from .balance import balance
-from .body import Poses
+from .body import Attachment, Poses
+from .end_tangents import EndTangents
 from .rotation import turning
-
-if TYPE_CHECKING:
-    from .system import RodsWithBodies
+from .rows import Rows
 
 Change = Callable[[np.ndarray], np.ndarray]
+
+
+class Joined(NamedTuple):
+    """Rods and bodies, the ends in bodies, and the nodes of each body's rods and of the rod that each motor turns."""
+
+    rods: RodSystem
+    rows: Rows
+    ends: tuple[Attachment, ...]
+    tangents: EndTangents  # of those ends that are clamped, in their order
+    at: np.ndarray  # (k,) flat indices of the unknowns that bodies carry
+    nodes: Sequence[np.ndarray]
+    driven: Sequence[np.ndarray]
 
 
 class Carrying:
     """The bodies of a system over a step whose fluid is asked at the geometry ``there``."""
 
-    def __init__(self, system: RodsWithBodies, there: Configuration) -> None:
-        self.system, self.rows, self.q = system, system.rows, system.rows.q
+    def __init__(self, joined: Joined, there: Configuration) -> None:
+        self.joined, self.rows, self.q = joined, joined.rows, joined.rows.q
         rods, poses = self.rows.rods(there), self.rows.poses(there)
-        known = system.nodes, system.driven, system.motors
+        known = joined.nodes, joined.driven, self.rows.motors
         self.balance = balance(rods, poses, *known, self.q, self.rows.m)
 
     def carried(
@@ -46,7 +58,7 @@ class Carrying:
         value, lever, tangents = self._ends(begin, poses, turns, y)
         external, change, external_columns = self._external(rods, begin, time, tangents)
         follow = Carried(
-            self.system.at,
+            self.joined.at,
             value,
             lever,
             self.rows.by,
@@ -63,10 +75,10 @@ class Carrying:
         self, begin: Configuration, poses: Poses, turns: np.ndarray, y: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
         """How far carried unknowns are off (k,), their levers (k, p), and those of the tangents of clamps (3, p)."""
-        value, lever, tangents = [np.zeros(0)], [np.zeros((0, self.q.count))], []
-        for end in self.system.attached:
-            at = place(end, self.system.motors, poses)
-            by = levers(end, self.system.motors, poses, turns, begin, self.q)
+        value, lever, tangents = [np.zeros(0)], [np.zeros((0, self.q.size))], []
+        for end in self.joined.ends:
+            at = place(end, self.rows.motors, poses)
+            by = levers(end, self.rows.motors, poses, turns, begin, self.q)
             value.append(at.r - begin.r[end.node] - y[end.node, :3])
             lever.append(by.r)
             if at.tangent is not None:
@@ -80,27 +92,27 @@ class Carrying:
         self, rods: Configuration, begin: Configuration, moment: Moment, tangents: Sequence[np.ndarray]
     ) -> np.ndarray:
         """How elastic forces follow q through the tangents of clamps (n, m, p)."""
-        system = self.system
-        filled = system.tangents.begin(rods, begin, self.rows.m)
-        system.tangents.elastic(filled, moment)
-        system.rods.add_nonlocal_twist(filled)
-        return self._through(system.tangents.of(filled), tangents)
+        joined = self.joined
+        filled = joined.tangents.begin(rods, begin, self.rows.m)
+        joined.tangents.elastic(filled, moment)
+        joined.rods.add_nonlocal_twist(filled)
+        return self._through(joined.tangents.of(filled), tangents)
 
     def _external(
         self, rods: Configuration, begin: Configuration, time: float, tangents: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, Change | None, np.ndarray]:
         """The loads on the nodes (n, m), how they change with these, and with q through tangents (n, m, p)."""
-        shape, system = (self.rows.n, self.rows.m), self.system
-        if not system.rods.loads:
-            return np.zeros(shape), None, np.zeros((*shape, self.q.count))
-        change = system.rods.external_stiffness(rods, begin, time).times
-        filled = system.tangents.begin(rods, begin, self.rows.m)
-        system.rods.add_loads(filled, time)
-        return system.rods.external(rods, time), change, self._through(system.tangents.of(filled), tangents)
+        shape, joined = (self.rows.n, self.rows.m), self.joined
+        if not joined.rods.loads:
+            return np.zeros(shape), None, np.zeros((*shape, self.q.size))
+        change = joined.rods.external_stiffness(rods, begin, time).times
+        filled = joined.tangents.begin(rods, begin, self.rows.m)
+        joined.rods.add_loads(filled, time)
+        return joined.rods.external(rods, time), change, self._through(joined.tangents.of(filled), tangents)
 
     def _through(self, forces: Sequence[np.ndarray], tangents: Sequence[np.ndarray]) -> np.ndarray:
         """The forces (n, m, p) by q, from those by the tangents (n, m, 3) and the tangents' levers (3, p)."""
-        out = np.zeros((self.rows.n, self.rows.m, self.q.count))
+        out = np.zeros((self.rows.n, self.rows.m, self.q.size))
         for force, tangent in zip(forces, tangents, strict=True):
             out += force @ tangent
         return out
@@ -108,7 +120,7 @@ class Carrying:
     def _pushed(self, poses: Poses, turns: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What the balances are to add up to (p,), how that follows q (p, p), and the drag of motors (p,)."""
         q = self.q
-        want, slope, drag = np.zeros(q.count), np.zeros((q.count, q.count)), np.zeros(q.count)
+        want, slope, drag = np.zeros(q.size), np.zeros((q.size, q.size)), np.zeros(q.size)
         for b, body in enumerate(self.rows.bodies):
             force, torque = body.pushed(poses.axes[b], time)
             want[q.moves(b)], want[q.turns(b)] = force, torque / q.length
@@ -116,7 +128,7 @@ class Carrying:
                 turn = turning(turns[b]) / q.length
                 slope[q.moves(b), q.turns(b)] = -cross_matrix(force) @ turn
                 slope[q.turns(b), q.turns(b)] = -cross_matrix(torque) @ turn / q.length
-        for k, motor in enumerate(self.system.motors):
+        for k, motor in enumerate(self.rows.motors):
             if motor.torque is not None:
                 want[q.motor(k)], drag[q.motor(k)] = motor.torque(time) / q.length, motor.drag / q.length**2
         return want, slope, drag

@@ -16,14 +16,14 @@ from ..linalg.stiffness import Stiffness
 from ..rods import geometry
 from ..rods.base import REVERSED, TangentReversed
 from ..rods.elastic_force import Moment
-from ..rods.end_tangents import EndTangents
 from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
 from ..rods.rates import Accepted, Memory
 from ..rods.system import RodSystem
 from .attached import Place, place, turn_of
 from .body import Attachment, Body, Motor, Poses
-from .carrying import Carrying
+from .carrying import Carrying, Joined
+from .end_tangents import EndTangents
 from .rows import Rows
 
 FURTHEST = 1.0  # radian: the largest turn of a body within a step
@@ -33,7 +33,7 @@ class BodyTurnedTooFar(StepFailed):
     """A body turned by more than a radian within a step."""
 
 
-class RodsWithBodies:
+class RodsWithBodies(RodSystem):
     """A system of rods, ``rods``, some ends of which are in bodies.
 
     ``nodes`` (one array a body) are all nodes of the body's rods, ``turned`` (one array a motor) those of the rod that
@@ -50,7 +50,6 @@ class RodsWithBodies:
         turned: Sequence[np.ndarray],
     ) -> None:
         self.rods, self.motors, self.attached = rods, tuple(motors), tuple(ends)
-        self.nodes, self.driven = nodes, turned
         self.unknowns, self.length, self.law, self.loads = rods.unknowns, rods.length, rods.law, rods.loads
         self.profile, self.closures, self.remembering = rods.profile, rods.closures, rods.remembering
         self.rows = Rows(len(rods.mesh.ds), rods.unknowns, bodies, motors, rods.length)
@@ -62,7 +61,8 @@ class RodsWithBodies:
         index = rods.ends.index
         self._anchored[index[index % self.unknowns < 3] // self.unknowns] = True
         self._anchored[[end.node for end in ends]] = True
-        self.at = np.concatenate([self._unknowns_of(end) for end in ends] or [np.zeros(0, np.int64)])
+        at = np.concatenate([self._unknowns_of(end) for end in ends] or [np.zeros(0, np.int64)])
+        self._joined = Joined(rods, self.rows, self.attached, self.tangents, at, nodes, turned)
         self.ends = _Ends(rods.ends, self.rows)
 
     @property
@@ -164,7 +164,7 @@ class RodsWithBodies:
 
     def bodies(self, there: Configuration) -> Carrying:
         """The bodies over a step whose fluid is asked at the geometry ``there``."""
-        return Carrying(self, there)
+        return Carrying(self._joined, there)
 
 
 class _Ends:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
-from .body import Body
+from .bodies.body import Body
 from .filament import Filament
 from .fluid import Contact, Fluid
 from .link import Link

@@ -3,7 +3,8 @@
 Bodies have their own 6 x 6 resistance, in their axes. With a_0 the correction of the nodes while bodies stay, and a_k
 that while only the k-th unknown q_k of the bodies moves by one, all by one factorisation of the rods' matrix,
 
-    (K - Z/tau) a_0 = Z (y - base)/tau - f,   carried: what they are off;    (K - Z/tau) a_k = -columns_k,   carried: lever_k
+    (K - Z/tau) a_0 = Z (y - base)/tau - f,   carried: what they are off
+    (K - Z/tau) a_k = -columns_k,             carried: lever_k
     F_0 = Z (y - base + a_0)/tau,   F_k = Z a_k/tau,   own drag D (q - base + dq)/tau
     [G (F_k - ext_k) + D/tau] dq = want - G (F_0 - ext_0) - D (q - base)/tau,   d = a_0 + sum dq_k a_k
 """

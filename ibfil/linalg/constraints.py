@@ -11,7 +11,7 @@ import numpy as np
 class Carried(NamedTuple):
     """Unknowns that bodies carry, and the balances that the bodies' own unknowns q (p,) obey; n nodes, N rows.
 
-    In a linear step the carried unknowns move by value + lever dq, forces on nodes change by ``columns`` dq besides, and
+    In a linear step the carried unknowns move by value + lever dq, forces on nodes change by ``columns`` dq too, and
 
         balance (F - external) + own drag + drag rate = want + slope dq
     """

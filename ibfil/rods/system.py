@@ -6,6 +6,7 @@ Everything a stepper asks of the rods is here, and nothing of the fluid.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -191,6 +192,6 @@ class RodSystem:
         """The prescribed displacements between two times."""
         return Prescribed(self.ends.index, self.ends.motion(before, after))
 
-    def bodies(self, there: Configuration) -> None:
+    def bodies(self, there: Configuration) -> Any:
         """None: there are none."""
         return None

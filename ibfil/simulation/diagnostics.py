@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,21 +13,9 @@ from ..io.snapshots import BodySnapshot, FilamentSnapshot, LinkSnapshot, MotorSn
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..fluids.output import FluidOutput
-    from ..rods.geometry import Configuration
     from ..timestepping.base import State
     from .model import Model
-
-
-class SolvedState(NamedTuple):
-    """A simulation at one instant: the state, and velocity, force on the fluid, reaction (n, m) of the step to it."""
-
-    state: State
-    velocity: np.ndarray
-    force: np.ndarray
-    reaction: np.ndarray
-    iterations: int
-    shortened: int
-    there: Configuration  # at which the fluid was asked
+    from .solved_state import SolvedState
 
 
 class Diagnostics:
@@ -77,8 +65,7 @@ class Diagnostics:
             return {}, {}
         from . import of_bodies
 
-        known = self._rods, self._mechanics, now
-        return of_bodies.bodies(*known), of_bodies.motors(*known)
+        return of_bodies.bodies(self._rods, now), of_bodies.motors(self._rods, now)
 
     def _twisting(self, filament: Filament, now: SolvedState, where: slice) -> dict[str, np.ndarray]:
         """The twist torque and the spin (N, 3) of a filament that twists, by name."""
@@ -147,7 +134,7 @@ class Diagnostics:
         if self._rods.bodies:
             from .of_bodies import wrench
 
-            return wrench(self._mechanics, now)
+            return wrench(self._rods, now)
         torque = np.cross(configuration.r, force[:, :3]).sum(axis=0)
         if force.shape[1] == 4:
             torque = torque + (force[:, 3:] * configuration.e3).sum(axis=0)

@@ -10,13 +10,12 @@ from ..io.snapshots import BodySnapshot, MotorSnapshot
 
 if TYPE_CHECKING:
     from ..assembly.stacked import RodStack
-    from ..bodies.system import RodsWithBodies
-    from .diagnostics import SolvedState
+    from .solved_state import SolvedState
 
 
-def bodies(rods: RodStack, system: RodsWithBodies, now: SolvedState) -> dict[str, BodySnapshot]:
+def bodies(rods: RodStack, now: SolvedState) -> dict[str, BodySnapshot]:
     """The bodies by name."""
-    rows, out = system.rows, {}
+    rows, out = rods.with_bodies.rows, {}
     poses = rows.poses(now.state.configuration)
     for b, (name, body) in enumerate(zip(rods.bodies, rows.bodies, strict=True)):
         centre, turn = rows.n + 2 * b, rows.n + 2 * b + 1
@@ -34,9 +33,9 @@ def bodies(rods: RodStack, system: RodsWithBodies, now: SolvedState) -> dict[str
     return out
 
 
-def motors(rods: RodStack, system: RodsWithBodies, now: SolvedState) -> dict[str, MotorSnapshot]:
+def motors(rods: RodStack, now: SolvedState) -> dict[str, MotorSnapshot]:
     """The motors by name."""
-    rows, out = system.rows, {}
+    rows, out = rods.with_bodies.rows, {}
     angles, first = rows.poses(now.state.configuration).angle, rows.n + 2 * len(rows.bodies)
     for k, (name, motor) in enumerate(zip(rods.motors, rows.motors, strict=True)):
         rate = float(now.velocity[first + k, 0]) / rows.length
@@ -48,9 +47,9 @@ def motors(rods: RodStack, system: RodsWithBodies, now: SolvedState) -> dict[str
     return out
 
 
-def wrench(system: RodsWithBodies, now: SolvedState) -> tuple[np.ndarray, np.ndarray]:
+def wrench(rods: RodStack, now: SolvedState) -> tuple[np.ndarray, np.ndarray]:
     """Total force and torque (3,) on the fluid, about the origin, at the geometry at which the fluid was asked."""
-    rows, there, force = system.rows, now.there, now.force
+    rows, there, force = rods.with_bodies.rows, now.there or now.state.configuration, now.force
     n, end = rows.n, rows.n + 2 * len(rows.bodies)
     moved, turned = force[n:end:2, :3], force[n + 1 : end : 2, :3]
     torque = np.cross(there.r[:n], force[:n, :3]).sum(axis=0) + np.cross(there.r[n:end:2], moved).sum(axis=0)

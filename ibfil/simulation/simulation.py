@@ -15,13 +15,14 @@ from ..errors import CaseError, RunFailed
 from ..rods.geometry import Configuration
 from ..rods.rates import Accepted
 from ..timestepping.base import FAILURES, State, Step
-from ..timestepping.semi_implicit import SemiImplicit
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import Verdict
 from . import failures, steps, timescales
-from .diagnostics import Diagnostics, SolvedState
+from .diagnostics import Diagnostics
 from .driving.drivers import Drivers
+from .first_motion import Motion, first_motion
 from .model import assemble
+from .solved_state import SolvedState
 
 if TYPE_CHECKING:
     from ..assembly.stacked import RodStack
@@ -51,7 +52,7 @@ class Simulation:
         self._turn = threading.RLock()
         self.notices: list[str] = []  # what has happened and nobody was told yet
         self._told = self._grown = False  # that the fluid moves too far in a step; that a disturbance grows too fast
-        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._last: Motion | None = None
         self._there = self.start  # where the fluid was asked for them; kept up with where there are bodies
         self.drivers = Drivers(self.model)
         self.choice = steps.choose(self.model, self.drivers)
@@ -296,29 +297,12 @@ class Simulation:
 
     # -- what is looked at ---------------------------------------------------------------------------------------
 
-    def _motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _motion(self) -> Motion:
         """Velocity, force on the fluid and reaction (n, m): of the step that led here, at the start of the first."""
         if self._last is None:
             dt = min(self.step_length, self.longest_step())
-            if self.model.mass is not None and not self.case.fluid.inertial:
-                dt *= 1e-3  # a rod with mass has the velocity that it starts with
-            stepper = self.model.stepper if self.model.noise is None else SemiImplicit()
-            try:
-                step = stepper.step(self.system, self.fluid, self.state_now, dt)
-                self._last = step.velocity, step.force, step.reaction
-            except FAILURES:
-                self._last = self._pushed(dt)
+            self._last = first_motion(self.model, self.state_now, dt)
         return self._last
-
-    def _pushed(self, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same, of the forces of this moment alone, over a time dt."""
-        now = self.state_now.configuration
-        force, inner = self.system.forces(now, self.time)
-        held, bodies = self.system.held(self.time, self.time + dt), self.system.bodies(now)
-        if bodies is not None:
-            held = bodies.carried(held, now, now, inner, self.time, np.zeros_like(force))
-        answer = self.fluid.response(now.r, now.e3, self.time, dt).forced(force, held, np.zeros_like(force))
-        return answer.move / dt, answer.force, answer.reaction
 
     def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments now, with diagnostics; velocities and forces are those of the step here, or of the first."""

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fluids.base import Fluid
-from ..linalg.constraints import Prescribed
 from .base import State, Step, System
 from .brownian import Asked, Noise
 
@@ -39,8 +38,8 @@ class Trapezoid:
         matrix = system.stiffness(start, start, inner, middle)
         response = fluid.response(start.r, start.e3, middle, 0.5 * dt)
         kick = 0.5 * self.noise.motion(Asked(system, fluid, state, response, middle, 0.5 * dt), dt)
-        index, value = system.held(state.time, state.time + dt)
-        held = Prescribed(index, 0.5 * value)
+        whole = system.held(state.time, state.time + dt)
+        held = whole._replace(value=0.5 * whole.value)
         half = response.implicit(
             force, matrix if response.keeps else matrix.copy(), held, np.zeros_like(force), kick
         ).move

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..bodies.end import End
 from ..faults import Fault, shown
-from ..filament import End, Filament, TwoWell
+from ..filament import Filament, TwoWell
 from ..schema import Scene
 from ..shape import RunShape
 

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+from ..bodies.end import End
 from ..expressions import Expression, ExpressionError
 from ..faults import Fault, shown
-from ..filament import End, Filament, TwoWell, copy_name, single
+from ..filament import Filament, TwoWell, copy_name, single
 from ..schema import Scene
 from ..shape import Circle, Helix, RunShape
 from .mass import check_mass

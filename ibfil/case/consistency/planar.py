@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from ..bodies.end import End
 from ..expressions import Expression, ExpressionError
 from ..faults import Fault
-from ..filament import End, Filament, Loads
+from ..filament import Filament, Loads
 from ..fluid import Fluid
 from ..schema import Scene
 from ..shape import Circle, ExpressionShape, Helix, Straight

@@ -12,7 +12,8 @@ import numpy as np
 from ...io.datasets import Meaning
 from ...io.writer import Recorder
 from ...observables.factory import observers
-from ...simulation.diagnostics import Diagnostics, SolvedState
+from ...simulation.diagnostics import Diagnostics
+from ...simulation.solved_state import SolvedState
 from ...timestepping.base import State
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import elastic_jacobian
-from .elastic_force import Moment
-from .geometry import Configuration
-from .linearization import Linearization, Shift
-from .mesh import Mesh
+from ..rods import elastic_jacobian
+from ..rods.elastic_force import Moment
+from ..rods.geometry import Configuration
+from ..rods.linearization import Linearization, Shift
+from ..rods.mesh import Mesh
 
 _REACH = 2  # nodes to either side whose forces feel a tangent, by the law's nonlocal twist
 
@@ -54,7 +54,7 @@ class EndTangents:
 
 
 class _Columns(Linearization):
-    """What follows tangents and curvatures; what follows places and turns stands in the stiffness."""
+    """The part that follows tangents and curvatures; that of places and turns stands in the stiffness."""
 
     def position(self, nodes: np.ndarray, rows: np.ndarray, shift: Shift = 0) -> None:
         """Nothing."""

@@ -1,0 +1,1 @@
+"""The tables of bodies, and of what is attached to them: motors and ends of filaments."""

@@ -1,0 +1,57 @@
+"""The table of a body in a case file: each key with its default and its meaning."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field
+
+from ..table import ZERO, Table
+from ..values import Listed, TripleT, Vector, by_kind, tagged
+from .shapes import Ellipsoid, Joint, Sphere
+
+STILL = (ZERO, ZERO, ZERO)
+
+
+class Motion(Table):
+    """A motion that is given."""
+
+    moves: TripleT = Field(STILL, description="displacement of the centre since t = 0")
+    turns: TripleT = Field(STILL, description="rotation vector since t = 0, axis times angle, in the lab")
+
+
+class Body(Table):
+    """A rigid body, which ends of filaments may be attached to."""
+
+    shape: Annotated[
+        Annotated[Sphere, tagged("sphere")]
+        | Annotated[Ellipsoid, tagged("ellipsoid")]
+        | Annotated[Joint, tagged("joint")],
+        by_kind("sphere", "sphere", "ellipsoid", "joint"),
+    ] = Field(description="its shape", examples=[{"kind": "sphere", "radius": 0.1}])
+    position: Vector | None = Field(
+        None,
+        description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod",
+    )
+    axes: Annotated[tuple[Vector, Vector], Listed(2)] = Field(
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), description="its first two axes at t = 0, in the lab"
+    )
+    motion: Annotated[
+        Annotated[Literal["free", "held"], tagged("word")] | Annotated[Motion, tagged("table")],
+        Discriminator(lambda value: "<table>" if isinstance(value, dict | Motion) else "<word>"),
+    ] = Field("free", description="free: force and torque balance; held in place; or a motion that is given")
+    force: TripleT | None = Field(None, description="external force on its centre")
+    torque: TripleT | None = Field(None, description="external torque on it")
+    frame: Literal["lab", "body"] = Field("lab", description="axes of force and torque: lab, or its own")
+
+    @property
+    def given_motion(self) -> Motion | None:
+        """The motion that is given; None where it is free."""
+        if isinstance(self.motion, Motion):
+            return self.motion
+        return Motion() if self.motion == "held" else None
+
+    @property
+    def own_axes(self) -> bool:
+        """Whether force and torque are along its own axes."""
+        return self.frame == "body"
