@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..case.schema import Case
     from ..rods.geometry import Configuration
-    from ..rods.system import RodSystem
+    from .stacked import RodStack
 
 
 class InBody(NamedTuple):
@@ -52,11 +53,18 @@ def motor_names(names: Sequence[str], filaments: Sequence[Filament]) -> tuple[st
     return tuple(name for name, end in ends if end.attached and end.motor is not None)
 
 
-def with_bodies(
-    case: Case, rods: RodSystem, begin: Configuration, filaments: Sequence[Filament], nodes: Sequence[slice]
-) -> RodsWithBodies:
-    """The system of these rods, which start as ``begin``, with the bodies of the case."""
-    names, ends = list(case.bodies), attached_ends(filaments, nodes)
+def with_bodies(case: Case, rods: RodStack) -> RodStack:
+    """These rods, with the bodies of the case."""
+    system = _system(case, rods)
+    start = system.rows.appended(rods.start, system.rows.start())
+    s = np.append(rods.s, np.zeros(system.rows.count - rods.count))
+    motors = motor_names(rods.names, rods.filaments)
+    return replace(rods, s=s, system=system, start=start, bodies=tuple(case.bodies), motors=motors)
+
+
+def _system(case: Case, rods: RodStack) -> RodsWithBodies:
+    """The system of the rods and the bodies."""
+    begin, names, ends = rods.start, list(case.bodies), attached_ends(rods.filaments, rods.nodes)
     bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.bodies.items()]
     motors: list[Motor] = []
     driven, attachments = [], []
@@ -67,10 +75,10 @@ def with_bodies(
             motor = len(motors)
             motors.append(_motor(at.end.motor, number_of, body, begin, at))
             driven.append(np.arange(at.where.start, at.where.stop))
-        attachments.append(_attachment(at, number_of, motor, body, begin, rods.unknowns))
+        attachments.append(_attachment(at, number_of, motor, body, begin, rods.system.unknowns))
     parts = [[np.arange(e.where.start, e.where.stop) for e in ends if e.end.body == name] for name in names]
     own = [np.unique(np.concatenate([np.zeros(0, np.int64), *some])) for some in parts]
-    return RodsWithBodies(rods, bodies, motors, attachments, own, driven)
+    return RodsWithBodies(rods.system, bodies, motors, attachments, own, driven)
 
 
 def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> Body:

@@ -165,15 +165,12 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     start = system.start(r, e1)
     for part in system.remembering:
         part.start(start)
-    known = names, filaments, tuple(nodes), tuple(ranges)
+    out = RodStack(names, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined))
     if not case.bodies:
-        return RodStack(*known, s, system, start, touching, tuple(joined))
-    from .bodies import motor_names, with_bodies
+        return out
+    from .bodies import with_bodies
 
-    whole = with_bodies(case, system, start, filaments, nodes)
-    s = np.append(s, np.zeros(whole.rows.count - len(s)))
-    told = tuple(case.bodies), motor_names(names, filaments)
-    return RodStack(*known, s, whole, whole.start(r, e1), touching, tuple(joined), *told)
+    return with_bodies(case, out)
 
 
 def _kind(filaments: tuple[Filament, ...], stacked: _Stacked) -> Callable[..., RodSystem]:

@@ -1,4 +1,4 @@
-"""What bodies carry in one step: the ends of rods, and the balances that their own unknowns obey."""
+"""The part of bodies in one step: the ends of rods, and the balances that their own unknowns obey."""
 
 from __future__ import annotations
 
