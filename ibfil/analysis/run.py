@@ -142,12 +142,24 @@ class Run(RunFile):
                 path = f"links/{name}/{key}"
                 about = {"units": self.units(path), "description": self.description(path)}
                 variables[f"{name}_{key}"] = (("time", f"{name}_element", *last), np.asarray(column), about)
+        variables |= self._of_bodies()
         for group, found in (("observables", self.observables), ("diagnostics", self.diagnostics)):
             for name, column in found.items():
                 dims = ("time", *(f"{name}_{i}" if n != 3 else "xyz" for i, n in enumerate(column.shape[1:])))
                 about = {"units": self.units(f"{group}/{name}"), "description": self.description(f"{group}/{name}")}
                 variables[name] = (dims, np.asarray(column), about)
         return xarray.Dataset(variables, coordinates, {"title": self.case.title, "case": self.case_text})
+
+    def _of_bodies(self) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
+        """The variables of bodies and motors: NAME_position (time, xyz) ..., NAME_motor_rate (time) ..."""
+        out = {}
+        for group, before, found in (("bodies", "", self.bodies), ("motors", "motor_", self.motors)):
+            for name, columns in found.items():
+                for key, column in columns.items():
+                    path, dims = f"{group}/{name}/{key}", ("time", "xyz")[: len(column.shape)]
+                    about = {"units": self.units(path), "description": self.description(path)}
+                    out[f"{name}_{before}{key}"] = (dims, np.asarray(column), about)
+        return out
 
     def _repr_html_(self) -> str:
         """All that `ibfil show` tells, in a notebook."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..bodies.body import Attachment, Body, Motor, OfTime
 from ..bodies.system import RodsWithBodies
+from ..case.table import ORIGIN
 from ..rods.boundary_conditions import spinning, steady, turned
 from .loads import number, triple
 
@@ -43,23 +44,13 @@ def attached_ends(filaments: Sequence[Filament], nodes: Sequence[slice]) -> list
     return out
 
 
-def motor_names(names: Sequence[str], filaments: Sequence[Filament]) -> tuple[str, ...]:
-    """The names of motors: NAME_start, NAME_finish by the end of the filament that each turns."""
-    ends = [
-        (f"{name}_{side}", getattr(f, side))
-        for name, f in zip(names, filaments, strict=True)
-        for side in ("start", "finish")
-    ]
-    return tuple(name for name, end in ends if end.attached and end.motor is not None)
-
-
 def with_bodies(case: Case, rods: RodStack) -> RodStack:
     """These rods, with the bodies of the case."""
     system = _system(case, rods)
     start = system.rows.appended(rods.start, system.rows.start())
     s = np.append(rods.s, np.zeros(system.rows.count - rods.count))
-    motors = motor_names(rods.names, rods.filaments)
-    return replace(rods, s=s, system=system, start=start, bodies=tuple(case.bodies), motors=motors)
+    joined = case.joined
+    return replace(rods, s=s, system=system, start=start, bodies=joined["body"], motors=joined["motor"])
 
 
 def _system(case: Case, rods: RodStack) -> RodsWithBodies:
@@ -102,7 +93,7 @@ def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> B
 def centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration) -> np.ndarray:
     """The centre (3,): as given, or such that the first end is on the surface, the centre behind its tangent."""
     if table.position is not None or not ends:
-        return np.array(table.position or (0.0, 0.0, 0.0))
+        return np.array(table.position or ORIGIN)
     first, size = ends[0], np.array(table.shape.semi_axes)
     out = begin.e3[first.node] * (-1.0 if first.finish else 1.0)  # from the body into the rod
     if not size.any():

@@ -31,6 +31,7 @@ class Stop(Table):
 # Kinds whose number is fitted to a series, and the name of that.
 _FITTED_TO = {
     "drift": "position",
+    "body_drift": "position",
     "growth": "amplitude",
     "circularity": "position",
     "frequency": "position_seen",
@@ -71,11 +72,27 @@ class Observe(Table):
         "link_tension",
         "link_slide",
         "link_shear",
+        "body_position",
+        "body_velocity",
+        "body_spin",
+        "body_axis",
+        "body_drift",
+        "body_force",
+        "body_torque",
+        "motor_angle",
+        "motor_rate",
+        "motor_torque",
+        "motor_power",
     ] = Field(description="what is taken; each is explained at the end of `ibfil schema`", examples=["speed"])
     filament: str = Field(
         "", description="name of a filament; where there are several, needed but for dissipation and flux"
     )
     link: str = Field("", description="name of a link, where the kind looks at one")
+    body: str = Field("", description="name of a body, where the kind looks at one")
+    motor: str = Field(
+        "",
+        description="of a motor, where the kind looks at one: FILAMENT_start or FILAMENT_finish, by the end it turns",
+    )
     at: Annotated[
         float | tuple[float, float] | Literal["start", "finish", "middle", "centroid"],
         Place(("start", "finish", "middle", "centroid")),
@@ -104,9 +121,10 @@ class Observe(Table):
         return self.kind == "flux"
 
     @property
-    def of_link(self) -> bool:
-        """Whether it looks at a link, and at no filament."""
-        return self.kind.startswith("link_")
+    def looks_at(self) -> str:
+        """The key of what it looks at: filament, link, body or motor."""
+        first = self.kind.partition("_")[0]
+        return first if first in ("link", "body", "motor") else "filament"
 
     @property
     def series(self) -> str:

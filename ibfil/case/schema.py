@@ -137,6 +137,17 @@ class Scene(Table):
         return any(filament.mass is not None for filament in self.filaments.values())
 
     @property
+    def joined(self) -> dict[str, tuple[str, ...]]:
+        """The names of links, bodies and motors; a motor is called by the end it turns, FILAMENT_start."""
+        motors = [
+            f"{name}_{side}"
+            for name, filament in self.filaments.items()
+            for side in ("start", "finish")
+            if getattr(filament, side).motor is not None
+        ]
+        return {"link": tuple(self.links), "body": tuple(self.bodies), "motor": tuple(motors)}
+
+    @property
     def couples_torque(self) -> bool:
         """Whether twist torques go onto the grid."""
         return self.fluid.couples_torque and self.twists

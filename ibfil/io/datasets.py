@@ -41,6 +41,24 @@ _LINK = {
     "shear": ("force/length", "shear force per length on the second of bound filaments, along it"),
     "active": ("force/length", "the active part of the shear force per length"),
 }
+_BODY = {
+    "position": ("length", "position of the body's centre, unwrapped"),
+    "e1": ("1", "first axis of the body"),
+    "e2": ("1", "second axis of the body"),
+    "e3": ("1", "third axis of the body"),
+    "velocity": ("length/time", "velocity of its centre over the step to the output, at t = 0 over the first"),
+    "spin": ("1/time", "rate at which the body turns, over that step"),
+    "force": ("force", "force of the body itself on the fluid, that of its rods not in it"),
+    "torque": ("force length", "torque of the body itself on the fluid, about its centre"),
+    "reaction": ("force", "force that holds or moves the body, where its motion is given"),
+    "reaction_torque": ("force length", "torque that holds or moves the body, about its centre"),
+}
+_MOTOR = {
+    "angle": ("1", "angle by which the rod has turned against the body since the start, rad"),
+    "rate": ("1/time", "rate at which it turns, over the step to the output"),
+    "torque": ("force length", "torque of the motor on the rod, about its axis"),
+    "power": ("force length/time", "power of the motor, torque times rate"),
+}
 _DIAGNOSTICS = {
     "net_force": ("force", "total force on the fluid"),
     "net_torque": ("force length", "total torque on the fluid"),
@@ -69,6 +87,9 @@ FIELDS = {
 }
 
 
+_KINDS = {"filaments": _FILAMENT, "links": _LINK, "bodies": _BODY, "motors": _MOTOR}
+
+
 class Meaning(NamedTuple):
     """The meaning of a dataset: its dimension as in units.py, and words."""
 
@@ -85,14 +106,14 @@ def meaning_of(name: str, observables: Mapping[str, Meaning]) -> Meaning:
         return observables[last]
     if group == "diagnostics":
         return Meaning(*_DIAGNOSTICS.get(last, ("1", last.replace("_", " "))))
-    return Meaning(*(_LINK if group.startswith("links/") else _FILAMENT)[last])
+    return Meaning(*_KINDS[group.partition("/")[0]][last])
 
 
 def rows_of(snapshot: Snapshot, series: Mapping[str, Any]) -> dict[str, Any]:
     """Dataset -> value of one output."""
     rows: dict[str, Any] = {"time": snapshot.time}
-    for kind, found in (("filaments", snapshot.filaments), ("links", snapshot.links)):
-        for name, part in found.items():
+    for kind in _KINDS:
+        for name, part in getattr(snapshot, kind).items():
             for field in fields_of(part):
                 value = getattr(part, field.name)
                 if value is not None:

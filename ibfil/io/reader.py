@@ -24,13 +24,14 @@ from .opening import damaged, open_run_file
 from .ownership import is_being_written
 from .pace import pace_of
 from .paths import journal_path
-from .snapshots import FilamentSnapshot, LinkSnapshot, Snapshot
+from .snapshots import BodySnapshot, FilamentSnapshot, LinkSnapshot, MotorSnapshot, Snapshot
 
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from ..case.schema import Case
 
 
+_PARTS = {"filaments": FilamentSnapshot, "links": LinkSnapshot, "bodies": BodySnapshot, "motors": MotorSnapshot}
 _GROUPS = ("filaments", "observables", "diagnostics")
 _BLOCK = 256  # outputs read at once by `frames`
 
@@ -132,6 +133,16 @@ class RunFile:
     def links(self) -> dict[str, dict[str, Column]]:
         """Link -> name -> Column (T, K, 3) or (T, K): the attributes of a LinkSnapshot that its kind has."""
         return {name: self._columns(f"links/{name}") for name in self._file.get("links", {})}
+
+    @cached_property
+    def bodies(self) -> dict[str, dict[str, Column]]:
+        """Body -> name -> Column (T, 3): position, e1, e2, e3, velocity, spin, force, torque, and reactions if held."""
+        return {name: self._columns(f"bodies/{name}") for name in self._file.get("bodies", {})}
+
+    @cached_property
+    def motors(self) -> dict[str, dict[str, Column]]:
+        """Motor, FILAMENT_start or FILAMENT_finish -> angle, rate, torque, power -> Column (T,)."""
+        return {name: self._columns(f"motors/{name}") for name in self._file.get("motors", {})}
 
     @cached_property
     def observables(self) -> dict[str, Column]:
@@ -273,14 +284,18 @@ class RunFile:
         stop = self._rows if stop is None else min(stop, self._rows)
         for low in range(start, stop, _BLOCK):
             block = slice(low, min(low + _BLOCK, stop))
-            filaments = {n: {k: c[block] for k, c in columns.items()} for n, columns in self.filaments.items()}
-            links = {n: {k: c[block] for k, c in columns.items()} for n, columns in self.links.items()}
+            parts = {
+                kind: {n: {k: c[block] for k, c in columns.items()} for n, columns in getattr(self, kind).items()}
+                for kind in _PARTS
+            }
             diagnostics = {name: column[block] for name, column in self.diagnostics.items()}
             for i, time in enumerate(self.time[block]):
                 yield Snapshot(
                     time=float(time),
-                    filaments={name: _at(FilamentSnapshot, arrays, i) for name, arrays in filaments.items()},
-                    links={name: _at(LinkSnapshot, arrays, i) for name, arrays in links.items()},
+                    **{
+                        kind: {name: _at(of, arrays, i) for name, arrays in parts[kind].items()}
+                        for kind, of in _PARTS.items()
+                    },
                     diagnostics={k: float(v[i]) if v.ndim == 1 else v[i] for k, v in diagnostics.items()},
                 )
 

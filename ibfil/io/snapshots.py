@@ -53,9 +53,11 @@ class BodySnapshot:
     """One body at one time, in the case's units and the lab frame."""
 
     position: np.ndarray  # (3,) of its centre, unwrapped
-    axes: np.ndarray  # (3, 3) its axes, one a row
+    e1: np.ndarray  # (3,) its axes
+    e2: np.ndarray  # (3,)
+    e3: np.ndarray  # (3,)
     velocity: np.ndarray  # (3,) of its centre
-    rate: np.ndarray  # (3,) at which it turns
+    spin: np.ndarray  # (3,) rate at which it turns
     force: np.ndarray  # (3,) of the body itself on the fluid
     torque: np.ndarray  # (3,) the same about its centre
     reaction: np.ndarray | None = None  # (3,) force that holds or moves it; None where it is free
@@ -69,11 +71,7 @@ class MotorSnapshot:
     angle: float  # turned since the start, the rod against the body
     rate: float
     torque: float  # of the body on the rod, about the axis
-
-    @property
-    def power(self) -> float:
-        """The power it puts into the scene."""
-        return self.torque * self.rate
+    power: float  # torque times rate
 
 
 @dataclass(frozen=True)

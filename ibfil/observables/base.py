@@ -130,7 +130,7 @@ class ObservableBase:
         along = observe.along or self.along
         self.axis = None if along is None else np.array(along) / np.linalg.norm(along)
         details = [f"{key} = {_shown(value)}" for key, value in self.details(observe).items()]
-        whose = "all filaments" if observe.together else observe.link or observe.filament
+        whose = "all filaments" if observe.together else getattr(observe, observe.looks_at)
         self.description = ", ".join([f"{self.description} of {whose}", *details])
         how = "" if self.fitted else _SUMMARIES[observe.summary].words
         over = [] if observe.over is None else [f"over = {_shown(observe.over)}"]

@@ -21,7 +21,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
 
     Raises CaseError, a line for each observable or stop rule that asks for what its kind does not have.
     """
-    from . import closed, diffusion, fitted, linked, local, together, windowed  # noqa: F401  (they fill KINDS)
+    from . import closed, diffusion, fitted, linked, local, of_bodies, together, windowed  # noqa: F401  (they fill KINDS)
     from .stop_rules import stop_faults
 
     made: dict[str, Observable] = {}
@@ -48,7 +48,7 @@ def numbers_of(case: Case, times: np.ndarray, series: Mapping[str, Any]) -> dict
 
 def kinds_text() -> str:
     """The kinds of observables and their keys, for `ibfil schema`."""
-    from . import closed, diffusion, fitted, linked, local, together, windowed  # noqa: F401  (they fill KINDS)
+    from . import closed, diffusion, fitted, linked, local, of_bodies, together, windowed  # noqa: F401  (they fill KINDS)
 
     lines = ["The kinds of [observe.NAME]: what each takes at an output, or of the run, and the keys it has"]
     for name, kind in KINDS.items():

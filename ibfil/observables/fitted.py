@@ -42,10 +42,7 @@ class Drift(Component, kind="drift"):
     def summary(self, times: np.ndarray, samples: np.ndarray) -> Value:
         """Return the mean velocity over `over`."""
         start, end = self.window(times)
-        if end <= start:
-            return plain(np.full(samples.shape[1:], np.nan))
-        moved = time_series.at_time(times, samples, end) - time_series.at_time(times, samples, start)
-        return plain(moved / (end - start))
+        return plain(time_series.drift(times, samples, start, end))
 
     def error(self, times: np.ndarray, samples: np.ndarray) -> StandardError | None:
         """From the drifts over blocks."""

@@ -43,6 +43,14 @@ def at_time(times: np.ndarray, values: np.ndarray, time: float) -> np.ndarray:
     return np.array([np.interp(time, times, column) for column in values.T])
 
 
+def drift(times: np.ndarray, samples: np.ndarray, start: float, end: float) -> np.ndarray:
+    """The mean rate of change of samples (T, ..) between two times; no number where these do not come in order."""
+    if end <= start:
+        return np.full(samples.shape[1:], np.nan)
+    moved: np.ndarray = (at_time(times, samples, end) - at_time(times, samples, start)) / (end - start)
+    return moved
+
+
 def mean(times: np.ndarray, values: np.ndarray, start: float, end: float) -> np.ndarray:
     """Time mean () or (3,) of the broken line through the outputs, from ``start`` to ``end``."""
     if end <= start:

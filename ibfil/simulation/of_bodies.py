@@ -20,9 +20,12 @@ def bodies(rods: RodStack, now: SolvedState) -> dict[str, BodySnapshot]:
     for b, (name, body) in enumerate(zip(rods.bodies, rows.bodies, strict=True)):
         centre, turn = rows.n + 2 * b, rows.n + 2 * b + 1
         given = body.moves is not None
+        e1, e2, e3 = (axis.copy() for axis in poses.axes[b].T)
         out[name] = BodySnapshot(
             poses.centre[b].copy(),
-            poses.axes[b].T.copy(),
+            e1,
+            e2,
+            e3,
             now.velocity[centre, :3].copy(),
             now.velocity[turn, :3] / rows.length,
             now.force[centre, :3].copy(),
@@ -43,7 +46,7 @@ def motors(rods: RodStack, now: SolvedState) -> dict[str, MotorSnapshot]:
             torque = motor.torque(now.state.time) - motor.drag * rate
         else:
             torque = float(now.reaction[first + k, 0]) * rows.length
-        out[name] = MotorSnapshot(float(angles[k]), rate, torque)
+        out[name] = MotorSnapshot(float(angles[k]), rate, torque, torque * rate)
     return out
 
 

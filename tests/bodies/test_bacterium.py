@@ -114,7 +114,7 @@ def test_the_rigid_solve():
     matrix = np.array([wrench(v, 0.0)[0] for v in np.eye(6)]).T
     v = np.linalg.solve(matrix, -wrench(np.zeros(6), 1.0)[0])
     head, motor = now.bodies["head"], now.motors["tail_start"]
-    for found, rigid in ((head.velocity, v[:3]), (head.rate, v[3:])):
+    for found, rigid in ((head.velocity, v[:3]), (head.spin, v[3:])):
         np.testing.assert_allclose(found, rigid, atol=5e-5 * np.linalg.norm(rigid))
     assert motor.torque == pytest.approx(wrench(v, 1.0)[1], rel=1e-4)
     largest = np.abs(now.filaments["tail"].force).max()

@@ -14,8 +14,7 @@ from ..schema import Scene
 from ..shape import Circle, Helix, RunShape
 from .mass import check_mass
 from .planar import check_planar
-
-Axis = tuple[float, float, float]
+from .vectors import parallel
 
 
 def check_filament(name: str, filament: Filament, case: Scene) -> Iterator[Fault]:
@@ -121,17 +120,12 @@ def _least(expression: Expression, length: float) -> tuple[float, str] | str:
     return least
 
 
-def _parallel(a: Axis, b: Axis) -> bool:
-    cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    return math.hypot(*cross) < 1e-9 * math.hypot(*a) * math.hypot(*b)
-
-
 def _place(key: str, filament: Filament) -> Iterator[Fault]:
     for name in ("direction", "normal"):
         if not any(getattr(filament, name)):
             yield Fault(f"{key}.{name}", shown(getattr(filament, name)), "a vector that is not zero")
             return
-    if filament.turned and _parallel(filament.direction, filament.normal):
+    if filament.turned and parallel(filament.direction, filament.normal):
         found = f"{shown(filament.normal)}, parallel to direction"
         yield Fault(f"{key}.normal", found, "a vector at an angle to direction", (f"{key}.direction",))
     copies = filament.copies

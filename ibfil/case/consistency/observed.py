@@ -11,7 +11,11 @@ from ..observe import Observe
 from ..schema import Scene
 
 # Three numbers where `along` is absent.
-VECTORS = ("position", "velocity", "displacement", "drift", "force", "torque")
+VECTORS = (
+    *("position", "velocity", "displacement", "drift", "force", "torque"),
+    *("body_position", "body_velocity", "body_spin", "body_axis", "body_drift", "body_force", "body_torque"),
+)
+OTHERS = {"link": "a [link.NAME]", "body": "a [body.NAME]", "motor": "an end of a filament with a motor"}
 
 
 def check_observed(case: Scene) -> Iterator[Fault]:
@@ -28,8 +32,8 @@ def _observe(case: Scene) -> Iterator[Fault]:
 
 def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
     filament = single(case.filaments, entry.filament)
-    if entry.of_link or entry.link:
-        yield from _of_link(key, entry, case)
+    if entry.looks_at != "filament" or any(getattr(entry, other) for other in OTHERS):
+        yield from _of_other(key, entry, case)
     elif filament is None and entry.filament in case.filaments:
         if not entry.together:
             found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
@@ -51,15 +55,17 @@ def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
         yield Fault(f"{key}.interval", found, "> 0 with diffusion, and only there", (f"{key}.kind",))
 
 
-def _of_link(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
-    """A link is named where it is looked at, and only there."""
-    if not entry.of_link:
-        found = f'{shown(entry.link)} with kind = "{entry.kind}"'
-        yield Fault(f"{key}.link", found, "only with kinds that look at a link", (f"{key}.kind",))
-    elif entry.link not in case.links:
-        found = shown(entry.link) + suggestion(entry.link, case.links) if entry.link else "nothing"
-        known = ", ".join(case.links) or "a [link.NAME], of which there is none"
-        yield Fault(f"{key}.link", found, known, ("link",))
+def _of_other(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
+    """A link, a body or a motor is named where it is looked at, and only there."""
+    for kind, none in OTHERS.items():
+        name, known = getattr(entry, kind), case.joined[kind]
+        if entry.looks_at != kind:
+            if name:
+                found = f'{shown(name)} with kind = "{entry.kind}"'
+                yield Fault(f"{key}.{kind}", found, f"only with kinds that look at a {kind}", (f"{key}.kind",))
+        elif name not in known:
+            found = shown(name) + suggestion(name, known) if name else "nothing"
+            yield Fault(f"{key}.{kind}", found, ", ".join(known) or f"{none}, of which there is none", (kind,))
 
 
 def _scalar(key: str, name: str, case: Scene) -> Iterator[Fault]:

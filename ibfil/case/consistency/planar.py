@@ -8,7 +8,7 @@ Shapes given by points or formulas are not looked at here.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from ..bodies.end import End
 from ..expressions import Expression, ExpressionError
@@ -17,9 +17,8 @@ from ..filament import Filament, Loads
 from ..fluid import Fluid
 from ..schema import Scene
 from ..shape import Circle, ExpressionShape, Helix, Straight
-
-Vector = tuple[float, float, float]
-Components = Sequence[Expression] | Sequence[float]
+from .planar_bodies import bodies_leaving
+from .vectors import Vector, across, along, component, cross, minus, unit, value
 
 
 def check_planar(key: str, filament: Filament, case: Scene) -> Iterator[Fault]:
@@ -76,7 +75,7 @@ def _about_the_rod(end: End, filament: Filament) -> bool:
         return isinstance(shape, Helix)  # which points everywhere
     bent = isinstance(shape, Circle) and shape.curvature != 0.0
     rod = directors[1:] if bent else directors[2:]  # an arc turns e3 towards e2
-    return any(_along(end.moment, axis, filament) for axis in rod)
+    return any(along(end.moment, axis, filament) for axis in rod)
 
 
 def _leaving(key: str, filament: Filament, case: Scene, axis: int) -> list[str]:
@@ -86,6 +85,7 @@ def _leaving(key: str, filament: Filament, case: Scene, axis: int) -> list[str]:
         return []  # told elsewhere: normal or direction
     normal = directors[axis]
     names = [f"{key}.{name}" for name in _own_leaving(filament, normal, axis)]
+    names += bodies_leaving(filament, normal, case)
     if case.fluid.flow is not None and _flow_leaves(case.fluid, filament, directors, axis):
         names.append("fluid.flow")
     if case.thermal is not None and (case.thermal.directions == "xyz" or math.hypot(*normal[:2]) > 1e-9):
@@ -98,9 +98,9 @@ def _own_leaving(filament: Filament, normal: Vector, axis: int) -> Iterator[str]
     shape = filament.shape
     if isinstance(shape, Helix) or (isinstance(shape, Circle) and shape.curvature != 0.0 and axis == 1):
         yield "shape.kind"
-    if _along(shape.perturb, normal, filament):
+    if along(shape.perturb, normal, filament):
         yield "shape.perturb"
-    if filament.velocity is not None and _along(filament.velocity, normal, filament):
+    if filament.velocity is not None and along(filament.velocity, normal, filament):
         yield "velocity"
     for side, end in (("start", filament.start), ("finish", filament.finish)):
         yield from (f"{side}.{name}" for name in _end_leaving(end, filament, normal, axis))
@@ -111,23 +111,23 @@ def _own_leaving(filament: Filament, normal: Vector, axis: int) -> Iterator[str]
 def _end_leaving(end: End, filament: Filament, normal: Vector, axis: int) -> Iterator[str]:
     for name in ("force", "moves", "tangent"):
         value = getattr(end, name)
-        if value is not None and _along(value, normal, filament):
+        if value is not None and along(value, normal, filament):
             yield name
-    if end.spring is not None and _along(_minus(end.spring.to, filament.position), normal, filament):
+    if end.spring is not None and along(minus(end.spring.to, filament.position), normal, filament):
         yield "spring.to"
     if end.moment is not None:  # in the plane bends a moment along its normal
         if end.frame == "body":
-            across = not (_zero(end.moment[1 - axis]) and _zero(end.moment[2]))
+            bends = not (_zero(end.moment[1 - axis]) and _zero(end.moment[2]))
         else:
-            across = any(_along(end.moment, other, filament) for other in _across(normal))
-        if across:
+            bends = any(along(end.moment, other, filament) for other in across(normal))
+        if bends:
             yield "moment"
 
 
 def _loads_leaving(loads: Loads, filament: Filament, normal: Vector, axis: int) -> Iterator[str]:
     for name in ("force", "weight"):
         value = getattr(loads, name)
-        if value is not None and _along(value, normal, filament):
+        if value is not None and along(value, normal, filament):
             yield name
     if loads.body_force is not None and not _zero(loads.body_force[axis]):
         yield "body_force"
@@ -137,29 +137,12 @@ def _loads_leaving(loads: Loads, filament: Filament, normal: Vector, axis: int) 
             yield name
 
 
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def _unit(a: Vector) -> Vector | None:
-    size = math.hypot(*a)
-    return (a[0] / size, a[1] / size, a[2] / size) if size > 0.0 else None
-
-
 def _directors(filament: Filament) -> tuple[Vector, Vector, Vector] | None:
     """e1, e2, e3 where the filament stands; None where direction and normal do not give them."""
-    e3 = _unit(_begins(filament))
+    e3 = unit(_begins(filament))
     upright = filament.own_normal and e3 is not None and math.hypot(*e3[:2]) < 1e-9
-    e2 = _unit(_cross(e3, (1.0, 0.0, 0.0) if upright else filament.normal)) if e3 else None
-    return (_cross(e2, e3), e2, e3) if e2 and e3 else None
+    e2 = unit(cross(e3, (1.0, 0.0, 0.0) if upright else filament.normal)) if e3 else None
+    return (cross(e2, e3), e2, e3) if e2 and e3 else None
 
 
 def _begins(filament: Filament) -> Vector:
@@ -172,23 +155,6 @@ def _begins(filament: Filament) -> Vector:
         return x, y, z
     except ExpressionError:
         return filament.direction
-
-
-def _across(normal: Vector) -> list[Vector]:
-    """Two unit vectors normal to ``normal``."""
-    start = (1.0, 0.0, 0.0) if abs(normal[0]) < 0.9 else (0.0, 1.0, 0.0)
-    first = _unit(_cross(normal, start))
-    assert first is not None
-    return [first, _cross(normal, first)]
-
-
-def _along(components: Components, normal: Vector, filament: Filament) -> bool:
-    """Whether a vector, at some s and t, has a component along ``normal``."""
-    for fraction, t in ((0.0, 0.0), (0.31, 0.17), (0.77, 0.53), (1.0, 1.3)):
-        values = dict(zip("xyz", filament.position, strict=True), s=fraction * filament.length, t=t)
-        if _component(components, normal, values):
-            return True
-    return False
 
 
 def _flow_leaves(fluid: Fluid, filament: Filament, directors: tuple[Vector, Vector, Vector], axis: int) -> bool:
@@ -206,26 +172,12 @@ def _flow_leaves(fluid: Fluid, filament: Filament, directors: tuple[Vector, Vect
                 away = [sum(q * u[k] for q, u in zip(parts, basis, strict=True)) for k in range(3)]
                 where = [p + filament.length * d for p, d in zip(filament.position, away, strict=True)]
                 places.append(dict(zip("xyz", where, strict=True), t=t))
-        if not any(_component(fluid.flow, directors[axis], place) for place in places[::2]):
+        if not any(component(fluid.flow, directors[axis], place) for place in places[::2]):
             continue
         try:
-            found = [_value(fluid.flow, directors[axis], place) for place in places]
+            found = [value(fluid.flow, directors[axis], place) for place in places]
         except ExpressionError:
             return True
         if held or max(found) - min(found) > 1e-9 * max(map(abs, found)):
             return True
     return False
-
-
-def _value(components: Components, normal: Vector, values: dict[str, float]) -> float:
-    """The component of a vector along ``normal``."""
-    return _dot([c.at(**values) if isinstance(c, Expression) else c for c in components], normal)
-
-
-def _component(components: Components, normal: Vector, values: dict[str, float]) -> bool:
-    """Whether the vector has a component along ``normal`` that is more than round-off."""
-    try:
-        vector = [c.at(**values) if isinstance(c, Expression) else c for c in components]
-    except ExpressionError:
-        return False
-    return abs(_dot(vector, normal)) > 1e-9 * math.hypot(*vector)

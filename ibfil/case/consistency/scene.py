@@ -13,6 +13,7 @@ from ..expressions import ExpressionError
 from ..faults import Fault, shown
 from ..fluid import Coefficients, Fluid, Matched
 from ..schema import Scene
+from .bodies import check_bodies
 from .closed import check_closed
 from .filament import check_filament
 from .links import check_links
@@ -35,6 +36,7 @@ def check(case: Scene) -> Iterator[Fault]:
         check_size,
         _one_force,
         check_closed,
+        check_bodies,
         check_links,
         _contact,
         _fluid,
