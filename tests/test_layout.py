@@ -133,7 +133,7 @@ def test_no_files_import_each_other_in_a_round():
 LONG_FILES = {  # lines today; the list only shrinks
     "case/expressions.py": 345,
     "rods/torque_free.py": 358,
-    "simulation/simulation.py": 383,
+    "simulation/simulation.py": 375,
 }
 LONG_FUNCTIONS: set[str] = set()
 

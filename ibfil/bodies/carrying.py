@@ -118,7 +118,7 @@ class Carrying:
         return out
 
     def _pushed(self, poses: Poses, turns: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What the balances are to add up to (p,), how that follows q (p, p), and the drag of motors (p,)."""
+        """The sums that the balances are to have (p,), how that follows q (p, p), and the drag of motors (p,)."""
         q = self.q
         want, slope, drag = np.zeros(q.size), np.zeros((q.size, q.size)), np.zeros(q.size)
         for b, body in enumerate(self.rows.bodies):

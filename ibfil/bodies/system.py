@@ -50,6 +50,7 @@ class RodsWithBodies(RodSystem):
         turned: Sequence[np.ndarray],
     ) -> None:
         self.rods, self.motors, self.attached = rods, tuple(motors), tuple(ends)
+        self.nodes, self.driven = nodes, turned
         self.unknowns, self.length, self.law, self.loads = rods.unknowns, rods.length, rods.law, rods.loads
         self.profile, self.closures, self.remembering = rods.profile, rods.closures, rods.remembering
         self.rows = Rows(len(rods.mesh.ds), rods.unknowns, bodies, motors, rods.length)

@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 _TWISTING = 0.7  # of the step of bending and stretching
 _CONTACT, _NOISE, _COUPLE, _MASS = 1.5, 0.1, 0.5, 0.3  # the same of an implicit one
 OWN = "forces by velocity"
+_BODY = 5.0  # a body with a motor or without: the same, of an implicit step
 
 
 def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
     """Return every term that the case names; ``memory`` are bytes of large arrays by what they are for."""
-    case, n = simulation.case, len(simulation.arclength)
+    case, n = simulation.case, simulation.rods.count
     unknowns, band = simulation.system.unknowns, memory[BAND]
     rods, implicit = costs.of_rods(case, n), costs.of_rods(case, n, "implicit")
     out = [Term("bending and stretching", rods, band * 9 / unknowns**2)]
@@ -44,6 +45,9 @@ def terms(simulation: Simulation, memory: dict[str, float]) -> list[Term]:
         out.append(Term("couple across the thickness", _COUPLE * implicit, memory[OWN]))
     if simulation.model.mass is not None:
         out.append(Term("mass", _MASS * implicit, 0.0 if simulation.model.thickness is not None else memory[OWN]))
+    if case.bodies:
+        count = len(simulation.rods.bodies) + len(simulation.rods.motors) / 6
+        out.append(Term("bodies and motors", _BODY * count * implicit, 8.0 * 6 * count * 3 * unknowns * n))
     rest = {name: size for name, size in memory.items() if name != OWN}
     return out + simulation.model.fluid_model.terms(simulation.rods, rest, simulation.step_length)
 
@@ -56,7 +60,7 @@ def shares(found: list[Term]) -> list[tuple[str, float, float]]:
 
 def memory(simulation: Simulation) -> dict[str, float]:
     """Bytes of the large arrays, by what they are for."""
-    n, m = len(simulation.arclength), simulation.system.unknowns
+    n, m = simulation.rods.count, simulation.system.unknowns
     band = 8.0 * n * m * m * (2 * simulation.system.profile.width + 1)
     own = {} if simulation.model.fluid is simulation.model.inner else {OWN: 2 * band}
     return {BAND: band, **simulation.model.fluid_model.memory(simulation.rods), **own}
@@ -64,7 +68,7 @@ def memory(simulation: Simulation) -> dict[str, float]:
 
 def disk(simulation: Simulation) -> float:
     """Bytes of the run file, at most: fields are compressed."""
-    case, n = simulation.case, len(simulation.arclength)
+    case, n = simulation.case, simulation.rods.count
     dues = due_times(case, simulation.grid is not None)
     size = sum(due.output for due in dues) * n * 8.0 * (20 if simulation.system.unknowns == 3 else 26)
     if simulation.grid is not None and case.output.grid_every is not None:

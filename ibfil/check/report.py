@@ -16,6 +16,7 @@ from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
 from ..simulation.steps import AUTOMATIC_ERROR, POINTS_A_PERIOD
 from ..timestepping.step_control import equal_parts
+from .bodies import ABSENT_OF_BODIES, in_body, of_body
 from .budget import disk, memory, shares, terms
 from .dimensionless import groups, oscillations
 from .warnings import warnings
@@ -65,7 +66,7 @@ def modelled(case: Case) -> list[str]:
         if not f.law.linear:
             terms.append(f"{f.law.kind} law")
         for side, end in (("start", f.start), ("finish", f.finish)):
-            terms.append(f"{side} {end.end}")
+            terms.append(f"{side} {end.end}" if not end.attached else in_body(side, end))
             terms += [f"{row.words} at {side}" for row in named(ON_ENDS, end)]
             terms += [f"{words} at {side}" for key, words in _MOTIONS.items() if getattr(end, key) is not None]
         if f.closed:
@@ -75,6 +76,7 @@ def modelled(case: Case) -> list[str]:
             terms.append("standing where its points are given (0.1.0 moved and turned them to position and direction)")
         out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
     out += [f"link {name}: {link.words}" for name, link in case.links.items()]
+    out += [of_body(name, body) for name, body in case.bodies.items()]
     if case.fluid.flow is not None:
         spins = ", and spins those that twist by half its vorticity about the tangent" if case.twists else ""
         out.append(f"a background flow, which moves the nodes{spins}")
@@ -118,6 +120,8 @@ def absent(case: Case) -> list[str]:
         out.append("contact: filaments may pass through each other")
     if not case.links:
         out.append("links between filaments")
+    if case.bodies:
+        out += ABSENT_OF_BODIES
     if case.thermal is None:
         out.append("thermal noise")
     elif not case.thermal.twist and case.twists:
@@ -126,7 +130,9 @@ def absent(case: Case) -> list[str]:
     of = "" if len(light) == len(case.filaments) else f", of {', '.join(light)}"
     inertia = [fluid.rod_inertia + of] * bool(light) + [fluid.fluid_inertia_absent] * bool(fluid.fluid_inertia_absent)
     walls = ["walls"] * (fluid.wall is None)
-    out.append("; ".join([*inertia, *walls, "heads", "closed rods"]))
+    heads = [] if case.bodies else ["heads and motors"]
+    rings = [] if any(filament.closed for filament in case.filaments.values()) else ["closed rods"]
+    out.append("; ".join([*inertia, *walls, *heads, *rings]))
     return out
 
 
@@ -148,7 +154,7 @@ def _bytes(count: float) -> str:
 def _costs(simulation: Simulation) -> list[str]:
     case, fluid = simulation.case, simulation.model.fluid_model
     unknowns = simulation.system.unknowns
-    lines = [f"{len(simulation.arclength)} nodes with {unknowns} unknowns each; method {simulation.method}"]
+    lines = [f"{simulation.rods.count} nodes with {unknowns} unknowns each; method {simulation.method}"]
     lines += fluid.size()
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
@@ -192,8 +198,8 @@ def _steps(simulation: Simulation) -> list[str]:
         lines += _automatic(simulation)
     if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
         lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
-    limit = "not with mass"
-    if not case.heavy:
+    limit = "not with bodies" if case.bodies else "not with mass"
+    if not case.heavy and not case.bodies:
         limit = f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)"
     return [
         *lines,
@@ -215,6 +221,8 @@ def _automatic(simulation: Simulation) -> list[str]:
             "the length over the run lets it"
         )
     growth = simulation.growth_rate()
+    if simulation.case.bodies:
+        lines.append("  how fast disturbances of the rods grow is not looked at in scenes with bodies")
     if growth:
         lines.append(
             f"  at first no longer than {2 * np.pi / growth / POINTS_A_PERIOD:.3g}: disturbances of the rods grow or "

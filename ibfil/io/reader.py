@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from ..errors import RunFileError
+from .column import Column
 from .opening import damaged, open_run_file
 from .ownership import is_being_written
 from .pace import pace_of
@@ -34,41 +35,6 @@ if TYPE_CHECKING:
 _PARTS = {"filaments": FilamentSnapshot, "links": LinkSnapshot, "bodies": BodySnapshot, "motors": MotorSnapshot}
 _GROUPS = ("filaments", "observables", "diagnostics")
 _BLOCK = 256  # outputs read at once by `frames`
-
-
-class Column:
-    """A dataset (T, ...) of which the first ``rows`` count; indexing reads, ``np.asarray`` reads it all."""
-
-    def __init__(self, dataset: h5py.Dataset, rows: int) -> None:
-        self._dataset = dataset
-        self.shape: tuple[int, ...] = (rows, *dataset.shape[1:])
-        self.dtype = dataset.dtype
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __repr__(self) -> str:
-        return f"<Column {self.shape} {self.dtype}; [...] reads>"
-
-    def __getitem__(self, key: Any) -> np.ndarray:
-        first, *rest = key if isinstance(key, tuple) else (key,)
-        if isinstance(first, slice):
-            start, stop, step = first.indices(len(self))
-            if step < 0:  # which h5py does not do
-                return self[(slice(None), *rest)][first]
-            first = slice(start, max(start, stop), step)
-        elif first is not Ellipsis:
-            number = int(first)
-            if not -len(self) <= number < len(self):
-                raise IndexError(f"output {number} of {len(self)}")
-            first = number % len(self)
-        else:
-            return np.asarray(self)[key]
-        return self._dataset[(first, *rest)]
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        values = self._dataset[: len(self)]
-        return values if dtype is None else values.astype(dtype)
 
 
 class GridRecord(NamedTuple):

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .body_rates import body_rate
+
 if TYPE_CHECKING:
     from ..case.filament import Filament
     from .driving.drivers import Drivers
@@ -37,8 +39,9 @@ def load_rate(model: Model, drivers: Drivers) -> float:
     """
     loads = [load for load in model.rods.system.loads if load.drives]
     flow, rods, rate = model.fluid_model.flow, model.rods, 0.0
+    of_bodies = max(body_rate(model, time) for time in _some(drivers)) if rods.bodies else 0.0
     if not loads and flow is None:
-        return 0.0
+        return of_bodies
     drag = {id(filament): model.fluid_model.drag(filament) * filament.length**2 for filament in rods.filaments}
     mass = {id(filament): 2 * mean_mass(filament) * filament.length**2 for filament in rods.filaments}
     for time in _some(drivers):
@@ -53,7 +56,7 @@ def load_rate(model: Model, drivers: Drivers) -> float:
             rate = max(rate, min(total / drag[id(filament)], heavy))
             if velocity is not None:
                 rate = max(rate, float(np.linalg.norm(np.ptp(velocity[where], axis=0))) / filament.length)
-    return 2 * np.pi * rate
+    return max(2 * np.pi * rate, of_bodies)
 
 
 def _some(drivers: Drivers) -> np.ndarray:

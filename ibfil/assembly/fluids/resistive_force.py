@@ -86,6 +86,7 @@ class ResistiveForceModel(FluidModel):
             where = "in free space" if fluid.free else "in the case's periodic box"
             out.append(f"its coefficients those of a straight rod of length {fluid.calibrated.matched:g} {where}")
             return out
+        out += self._bodies()
         for name, filament in self.case.filaments.items():
             (perp, par), drag = self._coefficients(filament), fluid.drag_of(filament.radius)
             which = f'drag = "{drag}"' if isinstance(drag, str) else "given"
@@ -95,6 +96,18 @@ class ResistiveForceModel(FluidModel):
             out.append(
                 f"drag of {name}: {perp / eta:.4g} eta across, {par / eta:.4g} eta along ({which}{unused}{spins})"
             )
+        return out
+
+    def _bodies(self) -> list[str]:
+        """The drags of bodies."""
+        from ...bodies.resistance import ellipsoid
+
+        out = []
+        for name, body in self.case.bodies.items():
+            if any(body.shape.semi_axes):
+                found = ellipsoid(np.array(body.shape.semi_axes), 1.0)[:2]
+                moved, turned = (", ".join(f"{x:.4g}" for x in dict.fromkeys(np.round(part, 12))) for part in found)
+                out.append(f"drag of {name}: {moved} eta along its axes, {turned} eta about them (in unbounded fluid)")
         return out
 
     def absent(self) -> list[str]:

@@ -1,6 +1,6 @@
 """The quantities of a scene that are prescribed in time, and their windows of rates, jumps and period.
 
-Every expression of a filament, a link or the flow that uses t drives, be it a strain, an end's motion, a load or a
+Every expression of a filament, a link, a body or the flow that uses t drives, be it a strain, a motion, a load or a
 law: they are found by walking the case. An end that spins drives whatever its rate.
 """
 
@@ -59,10 +59,13 @@ class Drivers:
                     largest = 1.0 if path in _ANGLES else np.inf
                     out.append(Drive(prefix + path, expression.tree, _used(expression, near), largest))
         s = np.linspace(0.0, max(f.length for f in self._model.case.filaments.values()), PLACES)
-        for name, link in self._model.case.links.items():
-            for path, expression in expressions(link):
-                if "t" in expression.variables:
-                    out.append(Drive(f"link.{name}.{path}", expression.tree, _used(expression, {"s": s})))
+        for kind, tables in (("link", self._model.case.links), ("body", self._model.case.bodies)):
+            for name, table in tables.items():
+                for path, expression in expressions(table):
+                    if "t" in expression.variables:
+                        largest = 1.0 if ".turns." in path else np.inf
+                        found = _used(expression, {"s": s})
+                        out.append(Drive(f"{kind}.{name}.{path}", expression.tree, found, largest))
         for k, component in enumerate(self._model.case.fluid.flow or ()):
             if "t" in component.variables:
                 near = _near(self._model, slice(None))
@@ -73,10 +76,11 @@ class Drivers:
     def spins(self) -> dict[str, Expression]:
         """The ends that spin: key -> rate."""
         return {
-            f"filament.{name}.{side}.spin": end.spin
+            f"filament.{name}.{side}.{key}": turning.spin
             for name, filament in self._model.case.filaments.items()
             for side, end in (("start", filament.start), ("finish", filament.finish))
-            if end.spin is not None and end.spin.constant != 0.0
+            for key, turning in (("spin", end), ("motor.spin", end.motor))
+            if turning is not None and turning.spin is not None and turning.spin.constant != 0.0
         }
 
     @cached_property
@@ -153,12 +157,15 @@ class Drivers:
 
 
 _SPINNING = "ning"  # after the key of a spin: the turning, beside how the spin changes
-_SPINS, _ANGLES = (tuple(f"{side}.{key}" for side in ("start", "finish")) for key in ("spin", "angle"))
+_SPINS, _ANGLES = (
+    tuple(f"{side}.{key}" for side in ("start", "finish") for key in (turned, f"motor.{turned}"))
+    for turned in ("spin", "angle")
+)
 
 
 def _sampled(drive: Drive) -> list[Sampled]:
     """The trees of which a drive's period is: an angle means what its direction means."""
-    if drive.key.endswith(_ANGLES):
+    if drive.key.endswith(_ANGLES) or ".turns." in drive.key:
         return [(("cos", drive.tree), {}), (("sin", drive.tree), {})]
     return [(drive.tree, drive.places)]
 

@@ -1,0 +1,52 @@
+"""Lines of `ibfil check` on bodies and motors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..case.bodies.shapes import Joint
+
+if TYPE_CHECKING:
+    from ..case.bodies.body import Body
+    from ..case.bodies.end import End
+    from ..case.bodies.motor import Motor
+
+ABSENT_OF_BODIES = ["contact of bodies, with each other and with rods", "mass of bodies"]
+
+
+def in_body(side: str, end: End) -> str:
+    """How an end is in a body, and what turns it there."""
+    words = f"{side} {'hinged to' if end.hinged else 'clamped into'} body {end.body}"
+    return words if end.motor is None else f"{words}, a motor of {_of_motor(end.motor)} between them"
+
+
+def _of_motor(motor: Motor) -> str:
+    for key, words in (("spin", "given rate"), ("angle", "given angle"), ("torque", "given torque")):
+        if getattr(motor, key) is not None:
+            return words
+    return f"torque {motor.stall:g} at rest, none at the rate {motor.free:g}"
+
+
+def of_body(name: str, body: Body) -> str:
+    """Its shape, how it moves, and what pushes it."""
+    terms = [_shape(body)]
+    given = body.given_motion
+    if given is None:
+        terms.append("free to move and turn")
+    else:
+        still = all(part.constant == 0.0 for part in (*given.moves, *given.turns))
+        terms.append("held" if still else "moved as given")
+    axes = "its own axes" if body.own_axes else "the lab"
+    pushed = [f"external {key} in {axes}" for key in ("force", "torque") if getattr(body, key) is not None]
+    total = "the force and torque of body and rods on the fluid sum to what pushes them from outside, to round-off"
+    return f"body {name}: " + ", ".join([*terms, *(pushed or ["nothing pushes it from outside"])]) + f"; {total}"
+
+
+def _shape(body: Body) -> str:
+    """Its size."""
+    if isinstance(body.shape, Joint):
+        return "a joint without size or drag"
+    first, *others = body.shape.semi_axes
+    if others == [first, first]:
+        return f"a sphere of radius {first:g}"
+    return "an ellipsoid of semi-axes " + ", ".join(f"{a:g}" for a in body.shape.semi_axes)
