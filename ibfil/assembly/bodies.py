@@ -4,44 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bodies.body import Attachment, Body, Motor, OfTime
+from ..bodies.body import NOTHING, Attachment, Body, Motor, OfTime
 from ..bodies.system import RodsWithBodies
 from ..case.table import ORIGIN
 from ..rods.boundary_conditions import spinning, steady, turned
+from .attached import InBody, attached_ends, check_places
 from .loads import number, triple
 
 if TYPE_CHECKING:
     from ..case.bodies import body as tables
-    from ..case.bodies.end import End
     from ..case.bodies.motor import Motor as MotorTable
-    from ..case.filament import Filament
     from ..case.schema import Case
+    from ..rods.base import Load
     from ..rods.geometry import Configuration
     from .stacked import RodStack
-
-
-class InBody(NamedTuple):
-    """An end of a rod in a body: its table, whether it is at s = L, its node, the rod's nodes, and if that twists."""
-
-    end: End
-    finish: bool
-    node: int
-    where: slice
-    twists: bool
-
-
-def attached_ends(filaments: Sequence[Filament], nodes: Sequence[slice]) -> list[InBody]:
-    """The ends that are in bodies."""
-    out = []
-    for filament, where in zip(filaments, nodes, strict=True):
-        for finish, (end, node) in enumerate(((filament.start, where.start), (filament.finish, where.stop - 1))):
-            if end.attached:
-                out.append(InBody(end, bool(finish), node, where, filament.twisting is not None))
-    return out
 
 
 def with_bodies(case: Case, rods: RodStack) -> RodStack:
@@ -55,8 +35,9 @@ def with_bodies(case: Case, rods: RodStack) -> RodStack:
 
 def _system(case: Case, rods: RodStack) -> RodsWithBodies:
     """The system of the rods and the bodies."""
-    begin, names, ends = rods.start, list(case.bodies), attached_ends(rods.filaments, rods.nodes)
+    begin, names, ends = rods.start, list(case.bodies), attached_ends(rods)
     bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.bodies.items()]
+    check_places(case, rods, ends, bodies)
     motors: list[Motor] = []
     driven, attachments = [], []
     for at in ends:
@@ -69,7 +50,18 @@ def _system(case: Case, rods: RodStack) -> RodsWithBodies:
         attachments.append(_attachment(at, number_of, motor, body, begin, rods.system.unknowns))
     parts = [[np.arange(e.where.start, e.where.stop) for e in ends if e.end.body == name] for name in names]
     own = [np.unique(np.concatenate([np.zeros(0, np.int64), *some])) for some in parts]
-    return RodsWithBodies(rods.system, bodies, motors, attachments, own, driven)
+    return RodsWithBodies(rods.system, bodies, motors, attachments, own, driven, _outside(rods, own))
+
+
+def _outside(rods: RodStack, own: Sequence[np.ndarray]) -> list[Load]:
+    """The loads but for links, and contact, that act between the rods of one body alone: these sum to zero."""
+    whole = any(len(nodes) == rods.count for nodes in own)
+    inner: list[Load] = [*rods.contact.loads()] if whole else []
+    for link in rods.links:
+        on_rods = bool(np.all(np.abs(link.elements.weights).sum(axis=2) > 0))  # a place in the lab has no weights
+        if on_rods and any(np.isin(link.elements.nodes, nodes).all() for nodes in own):
+            inner.append(link)
+    return [load for load in rods.system.loads if not any(load is other for other in inner)]
 
 
 def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> Body:
@@ -79,18 +71,21 @@ def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> B
     y /= np.linalg.norm(y)
     axes = np.column_stack([x, y, np.cross(x, y)])
     given = table.given_motion
+    turns = None if given is None else triple(given.turns, "t")
+    if not any(table.shape.semi_axes) and all(at.end.hinged for at in ends):
+        turns = _still  # a joint of hinges: nothing would tell how it turns
     return Body(
-        centre(table, axes, ends, begin),
+        _centre(table, axes, ends, begin),
         axes,
         None if given is None else triple(given.moves, "t"),
-        None if given is None else triple(given.turns, "t"),
+        turns,
         _of_time(table.force),
         _of_time(table.torque),
         table.own_axes,
     )
 
 
-def centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration) -> np.ndarray:
+def _centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration) -> np.ndarray:
     """The centre (3,): as given, or such that the first end is on the surface, the centre behind its tangent."""
     if table.position is not None or not ends:
         return np.array(table.position or ORIGIN)
@@ -99,6 +94,10 @@ def centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: 
     if not size.any():
         return begin.r[first.node].copy()
     return begin.r[first.node] - out / np.linalg.norm((out @ axes) / size)
+
+
+def _still(time: float) -> np.ndarray:
+    return NOTHING
 
 
 def _of_time(given) -> OfTime | None:

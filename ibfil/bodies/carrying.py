@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..linalg.constraints import Carried, Prescribed
+from ..rods.base import Load
 from ..rods.elastic_force import Moment
 from ..rods.geometry import Configuration
 from ..rods.loads import cross_matrix
@@ -32,6 +33,7 @@ class Joined(NamedTuple):
     at: np.ndarray  # (k,) flat indices of the unknowns that bodies carry
     nodes: Sequence[np.ndarray]
     driven: Sequence[np.ndarray]
+    outside: Sequence[Load]  # those that are not between a body and its own rods
 
 
 class Carrying:
@@ -101,14 +103,19 @@ class Carrying:
     def _external(
         self, rods: Configuration, begin: Configuration, time: float, tangents: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, Change | None, np.ndarray]:
-        """The loads on the nodes (n, m), how they change with these, and with q through tangents (n, m, p)."""
+        """The loads from outside (n, m), how they change with nodes, and with q through tangents (n, m, p)."""
         shape, joined = (self.rows.n, self.rows.m), self.joined
-        if not joined.rods.loads:
+        if not joined.outside:
             return np.zeros(shape), None, np.zeros((*shape, self.q.size))
-        change = joined.rods.external_stiffness(rods, begin, time).times
+        change = joined.rods.stiffness_of_loads(joined.outside, rods, begin, time).times
         filled = joined.tangents.begin(rods, begin, self.rows.m)
-        joined.rods.add_loads(filled, time)
-        return joined.rods.external(rods, time), change, self._through(joined.tangents.of(filled), tangents)
+        for load in joined.outside:
+            load.add_stiffness(time, filled)
+        return (
+            joined.rods.of_loads(joined.outside, rods, time),
+            change,
+            self._through(joined.tangents.of(filled), tangents),
+        )
 
     def _through(self, forces: Sequence[np.ndarray], tangents: Sequence[np.ndarray]) -> np.ndarray:
         """The forces (n, m, p) by q, from those by the tangents (n, m, 3) and the tangents' levers (3, p)."""

@@ -14,7 +14,7 @@ from ..errors import StepFailed
 from ..linalg.constraints import Prescribed
 from ..linalg.stiffness import Stiffness
 from ..rods import geometry
-from ..rods.base import REVERSED, TangentReversed
+from ..rods.base import REVERSED, Load, TangentReversed
 from ..rods.elastic_force import Moment
 from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
@@ -37,7 +37,7 @@ class RodsWithBodies(RodSystem):
     """A system of rods, ``rods``, some ends of which are in bodies.
 
     ``nodes`` (one array a body) are all nodes of the body's rods, ``turned`` (one array a motor) those of the rod that
-    it turns.
+    it turns, ``outside`` the loads that act from outside on a body's rods: not what acts between these.
     """
 
     def __init__(
@@ -48,6 +48,7 @@ class RodsWithBodies(RodSystem):
         ends: Sequence[Attachment],
         nodes: Sequence[np.ndarray],
         turned: Sequence[np.ndarray],
+        outside: Sequence[Load],
     ) -> None:
         self.rods, self.motors, self.attached = rods, tuple(motors), tuple(ends)
         self.nodes, self.driven = nodes, turned
@@ -63,7 +64,7 @@ class RodsWithBodies(RodSystem):
         self._anchored[index[index % self.unknowns < 3] // self.unknowns] = True
         self._anchored[[end.node for end in ends]] = True
         at = np.concatenate([self._unknowns_of(end) for end in ends] or [np.zeros(0, np.int64)])
-        self._joined = Joined(rods, self.rows, self.attached, self.tangents, at, nodes, turned)
+        self._joined = Joined(rods, self.rows, self.attached, self.tangents, at, nodes, turned, outside)
         self.ends = _Ends(rods.ends, self.rows)
 
     @property

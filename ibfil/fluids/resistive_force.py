@@ -215,6 +215,8 @@ class _Rows(NamedTuple):
     def times(self, d: np.ndarray) -> np.ndarray:
         """(K d) at the nodes (k, m)."""
         n, m = d.shape
+        if not len(self.nodes):
+            return np.zeros((0, m))
         w = (self.band.shape[2] // m - 1) // 2
         padded = np.zeros((n + 2 * w, m))
         padded[w : n + w] = d

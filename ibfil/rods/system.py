@@ -142,7 +142,8 @@ class RodSystem:
     def _loaded(self, linearization: Linearization, time: float) -> Stiffness:
         """The stiffness with the terms that the kernels leave out: nonlocal twist, and the loads."""
         self.add_nonlocal_twist(linearization)
-        self.add_loads(linearization, time)
+        for load in self.loads:
+            load.add_stiffness(time, linearization)
         return linearization.stiffness
 
     def add_nonlocal_twist(self, linearization: Linearization) -> None:
@@ -150,22 +151,20 @@ class RodSystem:
         if self.law.nonlocal_twist is not None:
             linearization.nonlocal_twist(self._unit_responses(linearization.configuration), self.law.nonlocal_twist)
 
-    def add_loads(self, linearization: Linearization, time: float) -> None:
-        """Adds how the loads change."""
-        for load in self.loads:
-            load.add_stiffness(time, linearization)
-
-    def external(self, configuration: Configuration, time: float) -> np.ndarray:
-        """The loads on each node (n, m)."""
+    def of_loads(self, loads: Sequence[Load], configuration: Configuration, time: float) -> np.ndarray:
+        """The forces (n, m) of some of the loads."""
         force = np.zeros((len(configuration.table), self.unknowns))
-        for load in self.loads:
+        for load in loads:
             load.add_force(configuration, time, force)
         return force
 
-    def external_stiffness(self, configuration: Configuration, start: Configuration, time: float) -> Stiffness:
-        """The Jacobian of ``external``."""
+    def stiffness_of_loads(
+        self, loads: Sequence[Load], configuration: Configuration, start: Configuration, time: float
+    ) -> Stiffness:
+        """The Jacobian of ``of_loads``."""
         linearization = Linearization(self.mesh, configuration, start, np.zeros(self._matrix_shape))
-        self.add_loads(linearization, time)
+        for load in loads:
+            load.add_stiffness(time, linearization)
         return linearization.stiffness
 
     def begin(self, tau: float, w: float) -> None:

@@ -120,17 +120,3 @@ def test_the_rigid_solve():
     largest = np.abs(now.filaments["tail"].force).max()
     for total in (now.diagnostics["net_force"], now.diagnostics["net_torque"]):
         assert np.abs(total).max() < 1e-12 * largest
-
-
-def test_a_cut_run_goes_on_bit_for_bit():
-    whole, cut = bacterium(49), bacterium(49)
-    whole.advance(0.2, lambda: None)
-    cut.advance(0.2, lambda: None)
-    again = bacterium(49)
-    again.restore(cut.state())
-    whole.advance(0.4, lambda: None)
-    again.advance(0.4, lambda: None)
-    np.testing.assert_array_equal(again.configuration.table, whole.configuration.table)
-    np.testing.assert_array_equal(
-        again.snapshot().diagnostics["net_torque"], whole.snapshot().diagnostics["net_torque"]
-    )

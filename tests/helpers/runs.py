@@ -80,6 +80,23 @@ normal = 100.0
 motor = { friction = 5.0, lag = 0.01 }
 """
 
+BODIES = """
+[body.head]
+shape = { kind = "ellipsoid", axes = [0.2, 0.15, 0.1] }
+force = [0.1, "sin(100*t)", 0]
+frame = "body"
+[body.held]
+shape = { kind = "sphere", radius = 0.1 }
+position = [0, 0, 1]
+motion = { moves = ["t", 0, 0] }
+[observe.spin]
+kind = "body_spin"
+body = "head"
+[observe.torque]
+kind = "motor_torque"
+motor = "rod_start"
+"""
+
 
 def rod(*overrides: str, more: str = ""):
     """Makes a case with a rod that is spun and bends itself in space."""
@@ -116,6 +133,17 @@ SCENES = {
     },
     "thermal": (rod("thermal={energy=1e-3}", "time.step=1e-3"), real, (2, 7)),
     "thermal in the plane": (rod("thermal={energy=1e-3, directions='xy', twist=false}"), real, (1, 5)),
+    **{
+        f"bodies, {how}": (
+            rod(*FLUIDS["rft"], f"filament.rod.start={{end='body', body='head', motor={motor}}}", *keys, more=BODIES),
+            real,
+            (2, 7),
+        )
+        for how, motor, keys in (
+            ("given step", "{spin=20}", []),
+            ("tolerance", "{stall=0.1, free=50}", SCHEMES["tolerance"]),
+        )
+    },
     "contact": (rod(*FLUIDS["table"], more=SECOND), real, (2, 7)),
     **{f"linked, {fluid}": (rod(*FLUIDS[fluid], more=LINKED), real, (2, 7)) for fluid in ("rft", "krylov")},
 }

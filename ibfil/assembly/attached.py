@@ -1,0 +1,92 @@
+"""Whether ends of rods are where their bodies are. Raises CaseError, a line for each that is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..errors import CaseError
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+    from ..case.bodies.end import End
+    from ..case.schema import Case
+    from ..rods.geometry import Configuration
+    from .stacked import RodStack
+
+INSIDE = 0.5  # of a segment, that nodes may be within a body
+_PARALLEL = 1e-6
+
+
+class InBody(NamedTuple):
+    """An end of a rod in a body: its table, whether it is at s = L, its node, the rod's nodes, and if that twists."""
+
+    end: End
+    finish: bool
+    node: int
+    where: slice
+    twists: bool
+
+
+def attached_ends(rods: RodStack) -> list[InBody]:
+    """The ends that are in bodies."""
+    out = []
+    for filament, where in zip(rods.filaments, rods.nodes, strict=True):
+        for finish, (end, node) in enumerate(((filament.start, where.start), (filament.finish, where.stop - 1))):
+            if end.attached:
+                out.append(InBody(end, bool(finish), node, where, filament.twisting is not None))
+    return out
+
+
+def check_places(case: Case, rods: RodStack, ends: Sequence[InBody], bodies: Sequence[Body]) -> None:
+    """Ends lie on their bodies, or within the size of these; rods do not run through them; a joint can turn one way."""
+    faults, names = [], list(case.bodies)
+    for at in ends:
+        body, table = bodies[names.index(at.end.body)], case.bodies[at.end.body]
+        filament = rods.names[next(k for k, where in enumerate(rods.nodes) if where == at.where)]
+        key = f"{case.file}: filament.{filament}.{'finish' if at.finish else 'start'}.body"
+        fault = _misplaced(at, body, np.array(table.shape.semi_axes), rods.start, case.filaments[filament].length)
+        faults += [f"{key}: {fault.format(name=at.end.body)}"] if fault else []
+    for name, table in case.bodies.items():
+        own = [at for at in ends if at.end.body == name]
+        if not any(table.shape.semi_axes) and _in_line(own, rods.start):
+            found = "found clamped filaments without twisting that leave a joint along one line, and may turn about it"
+            faults.append(f"{case.file}: body.{name}: {found}; allowed: twisting, or hinged ends")
+    if faults:
+        raise CaseError(faults)
+
+
+def _misplaced(at: InBody, body: Body, size: np.ndarray, start: Configuration, length: float) -> str:
+    """The fault of one end, with a place for the body's name; "" where there is none."""
+    segment = length / (at.where.stop - at.where.start - 1)
+    place = (start.r[at.where] - body.centre) @ body.axes
+    end = place[-1 if at.finish else 0]
+    away = float(np.linalg.norm(end))
+    if not size.any():
+        if away > segment:
+            return f"found an end {away:.3g} away from joint {{name}}; allowed: at most a segment, {segment:.3g}"
+        return ""
+    outside = _outside(end, size)
+    if outside > size.max():
+        return f"found an end {outside:.3g} off the surface of {{name}}; allowed: at most its size, {size.max():.3g}"
+    deepest = -min(float(_outside(point, size)) for point in place)
+    if deepest > INSIDE * segment * (1 + 1e-9):
+        return f"found nodes up to {deepest:.3g} inside {{name}}; allowed: at most half a segment, {0.5 * segment:.3g}"
+    return ""
+
+
+def _outside(point: np.ndarray, size: np.ndarray) -> float:
+    """How far a point (3,) is outside of an ellipsoid, seen from its centre; negative inside."""
+    scaled = float(np.linalg.norm(point / size))
+    return float(np.linalg.norm(point)) * (1 - 1 / scaled) if scaled > 0 else -float(size.min())
+
+
+def _in_line(ends: Sequence[InBody], start: Configuration) -> bool:
+    """Whether clamped ends, none of which holds a turn, have one line as their tangents."""
+    clamped = [at for at in ends if at.end.clamped]
+    if not clamped or any(at.twists for at in clamped):
+        return False
+    first, *others = (start.e3[at.node] for at in clamped)
+    return all(float(np.linalg.norm(np.cross(first, other))) < _PARALLEL for other in others)
