@@ -148,11 +148,11 @@ def half(name: str, at: float, end: str, more: str) -> str:
 
 
 def test_two_rods_welded_in_a_joint_are_one_rod():
-    """A weight on one half bends the pair as it bends a rod of their length."""
-    load = "loads = { weight = [0, -200, 100] }"
+    """A load on one half bends the pair as it bends a rod of their length."""
+    load = 'loads = { force = [0, "800*(s - 0.5)", "400*(0.5 - s)"] }'
     joint = body("j", '{ kind = "joint" }')
     pair = scene(joint, half("a", 0.0, "finish", load) + half("b", 0.5, "start", ""), step=2e-3)
-    forces = '[0, "where(s < 0.5, -200, 0)", "where(s < 0.5, 100, 0)"]'
+    forces = '[0, "where(s < 0.5, 800*(s - 0.5), 0)", "where(s < 0.5, 400*(0.5 - s), 0)"]'
     one = f'anchor = "start"\nposition = [0, 0, 0]\nloads = {{ force = {forces} }}'
     whole = scene("", ROD.format(name="rod", length=1.0, twisting=TWISTING, more=one).replace("21", "41"), step=2e-3)
     for sim in (pair, whole):
