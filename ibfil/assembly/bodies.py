@@ -109,7 +109,7 @@ def _motor(table: MotorTable, number_of: int, body: Body, begin: Configuration, 
     if isinstance(table.axis, str):
         axis, point = begin.e3[at.node] @ body.axes, (begin.r[at.node] - body.centre) @ body.axes
     else:
-        axis, point = np.array(table.axis) / np.linalg.norm(table.axis), np.zeros(3)
+        axis, point = np.array(table.axis) / np.linalg.norm(table.axis), np.array(table.through or ORIGIN)
     if table.stall is not None:
         assert table.free is not None
         stall = table.stall

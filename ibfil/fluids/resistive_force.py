@@ -214,13 +214,11 @@ class _Rows(NamedTuple):
 
     def times(self, d: np.ndarray) -> np.ndarray:
         """(K d) at the nodes (k, m)."""
-        n, m = d.shape
-        if not len(self.nodes):
-            return np.zeros((0, m))
+        m = d.shape[1]
         w = (self.band.shape[2] // m - 1) // 2
-        padded = np.zeros((n + 2 * w, m))
-        padded[w : n + w] = d
-        out = np.stack([row @ padded[i : i + 2 * w + 1].ravel() for row, i in zip(self.band, self.nodes, strict=True)])
+        padded = np.pad(d, ((w, w), (0, 0)))
+        rows = zip(self.band, self.nodes, strict=True)
+        out = np.array([row @ padded[i : i + 2 * w + 1].ravel() for row, i in rows]).reshape(-1, m)
         if self.pairs.rows.size:
             products = (self.pairs.blocks @ d[self.pairs.columns][:, :, None])[:, :, 0]
             np.add.at(out, np.searchsorted(self.nodes, self.pairs.rows), products)

@@ -124,6 +124,8 @@ def _driven(case: Case) -> Iterator[str]:
             yield f"filament.{name}.damping: found {filament.damping:g}; allowed: 0; modes do not have it"
         if filament.closed:
             yield f"filament.{name}.closed: found true; allowed: rods with ends; rests and modes are not of closed ones"
+    for name in case.bodies:
+        yield f"body.{name}: found a body; allowed: none; rests and modes are not of scenes with bodies"
     for name, link in case.links.items():
         if link.resists_rates:
             yield f"link.{name}: found what answers to rates; allowed: no damping, no motors; modes do not have it"

@@ -198,3 +198,14 @@ def test_a_joint_that_nothing_keeps_from_turning_is_refused():
     rods = (half("a", 0.0, "finish", "") + half("b", 0.5, "start", "")).replace(TWISTING, "")
     with pytest.raises(CaseError, match="leave a joint along one line, and may turn about it"):
         scene(body("j", '{ kind = "joint" }'), rods)
+
+
+def test_rests_and_modes_are_not_of_scenes_with_bodies():
+    from ibfil.simulation.at_rest import refuse_driven
+
+    case = parse_case(
+        SWIMMER.replace("curvature", "#").replace("loads", "#") + REST.format(bodies=body(), flow="", step=0.1),
+        "x.toml",
+    )
+    with pytest.raises(CaseError, match=r"body\.b: found a body; allowed: none; rests and modes"):
+        refuse_driven(case)

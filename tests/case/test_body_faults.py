@@ -77,6 +77,10 @@ CASES = {
         [MOTOR + "={spin=1,axis=[0,0,0]}"],
         f"{MOTOR}.axis: found [0.0, 0.0, 0.0]; allowed: a vector that is not zero",
     ),
+    "a place of the tangent": (
+        [MOTOR + "={spin=1,through=[0,0,1]}"],
+        f'{MOTOR}.through: found [0.0, 0.0, 1.0] with axis = "tangent"; allowed: only with axis = [x, y, z]',
+    ),
     "a motor at a hinge": (
         [START + '={end="body",body="head",hinged=true,motor={spin=1}}'],
         f"{MOTOR}: found a motor at a hinged end, which it could not turn; allowed: hinged = false",

@@ -21,6 +21,8 @@ class Motor(Table):
     axis: Annotated[
         Annotated[Literal["tangent"], tagged("word")] | Annotated[Vector, tagged("list")],
         Discriminator(lambda value: "<list>" if isinstance(value, list | tuple) else "<word>"),
-    ] = Field(
-        "tangent", description="its axis: the rod's tangent, or a direction in the body's axes, through the centre"
+    ] = Field("tangent", description="its axis: the rod's tangent, or a direction in the body's axes")
+    through: Vector | None = Field(
+        None,
+        description="a point on a given axis, from the body's centre in its axes; absent: the centre",
     )

@@ -79,6 +79,9 @@ def _motor(key: str, motor: Motor, end: End, filament: Filament) -> Iterator[Fau
     if (motor.stall is None) != (motor.free is None):
         present, absent = ("free", "stall") if motor.stall is None else ("stall", "free")
         yield Fault(f"{key}.{absent}", "nothing", f"a number > 0 with {present}")
+    if motor.through is not None and isinstance(motor.axis, str):
+        found = f'{shown(motor.through)} with axis = "{motor.axis}"'
+        yield Fault(f"{key}.through", found, "only with axis = [x, y, z]")
     if not isinstance(motor.axis, str) and not any(motor.axis):
         yield Fault(f"{key}.axis", shown(motor.axis), "a vector that is not zero")
 
