@@ -70,6 +70,13 @@ ColorBy(joined, ("POINTS", "link_force"))
 GetColorTransferFunction("link_force").ApplyPreset("Inferno (matplotlib)", True)
 bar(links, joined, {link!r}, 0.35)
 """
+_BODIES = """
+bodies = ExtractBlock(registrationName="bodies", Input=run, Selectors=["/Root/Block{block}"])
+solid = Show(bodies, view)
+ColorBy(solid, None)
+solid.AmbientColor = solid.DiffuseColor = [0.7, 0.75, 0.8]
+solid.LineWidth = 3.0
+"""
 _FLOW = """
 flow = ExtractBlock(registrationName="flow", Input=run, Selectors=["/Root/Block{block}"])
 slice1 = Slice(registrationName="slice", Input=flow, SliceType="Plane")
@@ -132,7 +139,7 @@ def write_scene(collection: Path, run: RunFile) -> Path:
     }
     rods = (
         'rods = ExtractBlock(registrationName="rods", Input=run, Selectors=["/Root/Block0"])'
-        if run.grid or run.links
+        if run.grid or run.links or run.bodies
         else "rods = run"
     )
     time = "time {time:.6g}" + ("" if units.time == "1" else f" {units.time}")
@@ -140,8 +147,11 @@ def write_scene(collection: Path, run: RunFile) -> Path:
     text += _RODS.format(tension=_labelled("tension", units.force))
     if run.links:
         text += _LINKS.format(link=_labelled("force of links", units.force))
+    if run.bodies:
+        text += _BODIES.format(block=1 + bool(run.links))
     if flow:
-        text += _FLOW.format(speed=_labelled("speed", run.units("grid/velocity")), block=2 if run.links else 1)
+        block = 1 + bool(run.links) + bool(run.bodies)
+        text += _FLOW.format(speed=_labelled("speed", run.units("grid/velocity")), block=block)
     text += _TAIL.replace("{clock}", repr(time))
     text += f"{_MARK}{zlib.crc32(text.encode()):08x}\n"
     if path.exists() and (path.read_bytes() == text.encode() or not _is_as_written(path)):

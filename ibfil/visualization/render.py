@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from ..analysis.body_meshes import extents
 from ..analysis.meshes import filament_data, rods_of
 from ..analysis.run import Run, open_run
 from ..assembly.fluids.models import fluid_model
@@ -22,6 +23,7 @@ from ..io.overwriting import BY_ENDING, refuse, replacing
 from ..io.units import label
 from ..screen import tell
 from .annotations import Words, bands, lettered
+from .bodies import LEGEND
 from .camera import viewpoint
 from .stage import FLOW, QUANTITIES, TIMES, Frame, Scale, Stage, frame_for, quantity
 
@@ -133,7 +135,7 @@ class _Pictures:
         self.run, self.wish = run, wish
         top, foot = bands(wish.size[1])
         size = wish.size[0], wish.size[1] - top - foot
-        positions = [np.asarray(columns["position"]) for columns in run.filaments.values()]
+        positions = [np.asarray(columns["position"]) for columns in run.filaments.values()] + extents(run)
         thick = max(float(rod.radius.max()) for rod in rods_of(run).values())
         self.frame: Frame = frame_for(viewpoint(positions), positions, thick, size)
         self.scale = _scale(run, wish)
@@ -147,7 +149,7 @@ class _Pictures:
             "streamlines": "flow along the plane through the middle",
         }.get(wish.flow, _of_thickness(run))
         strongest = _strongest(run)
-        note = "; ".join(word for word in (note, _of_links(run, strongest)) if word)
+        note = "; ".join(word for word in (note, _of_links(run, strongest), LEGEND if run.bodies else "") if word)
         title = " ".join(run.case.title.split()) or run.path.stem
         pixel = 2 * self.frame.half / size[1]
         self.words = Words(title, tuple(bars), run.case.units.length, pixel, note)

@@ -23,6 +23,7 @@ from ..io.overwriting import BY_ENDING, Kind, replacing
 from ..io.units import label
 from ..observables.base import KINDS
 from ..observables.time_series import trapezoid_weights
+from .bodies import add_outlines
 from .style import AXES, COLOURS, drawing, literal, plane_of_motion, with_units
 
 if TYPE_CHECKING:
@@ -127,6 +128,7 @@ def _shapes(fig: Figure, axes: Axes, run: RunFile, positions: Sequence[np.ndarra
         lines.set_array(times[picked])
         lines.set_clim(times[0], times[-1])
         axes.add_collection(lines)
+    add_outlines(axes, run, plane, picked, _time_colours(), (times[0], times[-1]))
     axes.autoscale_view()
     axes.margins(0.06)
     _names(axes, run, plane)

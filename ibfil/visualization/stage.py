@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..analysis.meshes import filament_data, link_lines
+from .bodies import add_bodies
 from .camera import Viewpoint
 from .streamlines import evenly_spaced
 
@@ -114,6 +115,7 @@ class Stage:
         mesh["shown"] = np.asarray(quantity(mesh, scale.name), float)
         self._add(mesh, scale, "rods")
         self._links(output)
+        add_bodies(self._plotter, self._run, output)
 
     def shape(self, output: int, scale: Scale) -> bool:
         """One of many shapes in the same picture, coloured by its time, later ones in front; whether it is to scale."""

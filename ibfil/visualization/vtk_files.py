@@ -1,8 +1,8 @@
 """A run as ParaView files.
 
-One .pvd collection with the real times, a .vtp of all filaments for each output and one of all links where there are
-any, a .vti for each grid field time, where there are several of these a .pvd of each alone, and a ready scene
-(paraview_scene.py).
+One .pvd collection with the real times, a .vtp of all filaments for each output, one of all links and one of all bodies
+where there are any, a .vti for each grid field time, where there are several of these a .pvd of each alone, and a ready
+scene (paraview_scene.py).
 
 Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
 file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
@@ -24,6 +24,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from ..analysis.body_meshes import body_surfaces
 from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of
 from ..errors import CaseError
 from ..io.overwriting import VTK, refuse, replacing
@@ -75,6 +76,7 @@ class Collection:
         self.path = folder / f"{run.stem}.pvd"
         self.filaments: Entries = []
         self.links: Entries = []
+        self.bodies: Entries = []
         self.fields: Entries = []
         self._created = ""
 
@@ -85,11 +87,11 @@ class Collection:
                 allowed = "a run in a periodic box, which rft and free space have not"
                 raise CaseError([f"{self.run}: found --wrap or --images; allowed: {allowed}"])
             if run.created != self._created:
-                self.filaments, self.links, self.fields, self._created = [], [], [], run.created
+                self.filaments, self.links, self.bodies, self.fields, self._created = [], [], [], [], run.created
             self.folder.mkdir(parents=True, exist_ok=True)
             self._add_filaments(run)
             self._add_fields(run)
-            kinds = {"filaments": self.filaments, "links": self.links, "grid": self.fields}
+            kinds = {"filaments": self.filaments, "links": self.links, "bodies": self.bodies, "grid": self.fields}
             there = {name: entries for name, entries in kinds.items() if entries}
             _write_collection(self.path, list(there.values()))
             if len(there) > 1:  # each kind alone too: filters of lines, such as Tube, may crash ParaView upon a grid
@@ -102,9 +104,9 @@ class Collection:
         return self.path.with_stem(f"{self.path.stem}_{kind}")
 
     def _add_filaments(self, run: RunFile) -> None:
-        """A .vtp for each output that is not there yet, and one of its links."""
-        _keep_common(self.filaments, run.time)
-        _keep_common(self.links, run.time)
+        """A .vtp for each output that is not there yet, and one of its links, and of its bodies."""
+        for entries in (self.filaments, self.links, self.bodies):
+            _keep_common(entries, run.time)
         rods, box = rods_of(run), box_of(run)
         done = len(self.filaments)
         for i, frame in enumerate(run.snapshots(done), done):
@@ -115,6 +117,10 @@ class Collection:
                 file = f"{self.run.stem}_links_{i:06d}.vtp"
                 _save(link_lines(frame), self.folder / file)
                 self.links.append((frame.time, file))
+            if frame.bodies:
+                file = f"{self.run.stem}_bodies_{i:06d}.vtp"
+                _save(body_surfaces(run, frame), self.folder / file)
+                self.bodies.append((frame.time, file))
 
     def _add_fields(self, run: RunFile) -> None:
         """A .vti for each time at which fields were written."""

@@ -1,0 +1,67 @@
+"""Bodies in pictures: as surfaces with their axes, and as outlines in a plane."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.body_meshes import body_surfaces
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+
+    from ..analysis.run import Run
+    from ..io.reader import RunFile
+
+SURFACE = "#b9c4cf"
+AXES = ("#d55e00", "#009e73", "#0072b2")  # which colour-blind readers can tell apart
+LEGEND = "axes of bodies: first red, second green, third blue"
+CORNERS = 60  # of an outline
+
+
+def add_bodies(plotter: Any, run: Run, output: int) -> None:
+    """Adds the bodies of an output to a picture, in place of those of another one."""
+    import pyvista
+
+    if not run.bodies:
+        return
+    whole = pyvista.wrap(body_surfaces(run, run.snapshot(output)))
+    surface = whole.copy()
+    surface.lines = np.zeros(0, int)
+    plotter.add_mesh(surface, color=SURFACE, smooth_shading=True, specular=0.2, name="bodies", reset_camera=False)
+    for k, colour in enumerate(AXES, 1):
+        tips = whole.points[whole["axis"] == k].reshape(-1, 2, 3)
+        if len(tips):
+            lines = pyvista.line_segments_from_points(tips.reshape(-1, 3))
+            plotter.add_mesh(lines, color=colour, line_width=4, lighting=False, name=f"axis {k}", reset_camera=False)
+
+
+def add_outlines(
+    axes: Axes, run: RunFile, plane: tuple[int, int], picked: np.ndarray, colours: Colormap, span: tuple[float, float]
+) -> None:
+    """Adds the outlines of bodies, seen along the normal of a plane of two lab axes, coloured by time as rods are."""
+    from matplotlib.collections import LineCollection
+
+    for name, columns in run.bodies.items():
+        size = np.array(run.case.bodies[name].shape.semi_axes)
+        if not size.any():
+            continue
+        centre = np.asarray(columns["position"])[picked]
+        turned = np.stack([np.asarray(columns[key])[picked] for key in ("e1", "e2", "e3")], axis=1)
+        seen = (centre[:, list(plane)], size[:, None] * turned[:, :, list(plane)])
+        rings = [middle + outline(arms) for middle, arms in zip(*seen, strict=True)]
+        lines = LineCollection(rings, cmap=colours, linewidths=1.2)
+        lines.set_array(np.asarray(run.time)[picked])
+        lines.set_clim(*span)
+        axes.add_collection(lines)
+
+
+def outline(arms: np.ndarray) -> np.ndarray:
+    """The outline (k, 2) of an ellipsoid whose semi-axes are seen as ``arms`` (3, 2): points u, u.(A^T A)^-1 u = 1."""
+    values, vectors = np.linalg.eigh(arms.T @ arms)
+    angle = np.linspace(0.0, 2 * np.pi, CORNERS + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.sqrt(np.maximum(values, 0.0))
+    out: np.ndarray = ring @ vectors.T
+    return out

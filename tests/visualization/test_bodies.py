@@ -1,0 +1,71 @@
+"""Bodies in ParaView files and pictures: surfaces and outlines where the body is, turned as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.runs import BODIES, FLUIDS, real, rod, run
+
+from ibfil.analysis.body_meshes import BEYOND, body_surfaces, extents
+from ibfil.io.reader import RunFile
+from ibfil.visualization.bodies import outline
+from ibfil.visualization.vtk_files import write_vtk
+
+SIZE = np.array([0.2, 0.15, 0.1])
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    file = tmp_path_factory.mktemp("bodies") / "run.h5"
+    given = rod(*FLUIDS["rft"], "filament.rod.start={end='body', body='head', motor={spin=20}}", more=BODIES)
+    run(given(), file, build=real)
+    return file
+
+
+def test_a_surface_is_that_of_the_body_and_its_axes_go_beyond_it(path):
+    import pyvista
+
+    with RunFile(path) as file:
+        snapshot = file.snapshot(-1)
+        found = pyvista.wrap(body_surfaces(file, snapshot))
+        ends = extents(file)
+    body = snapshot.bodies["head"]
+    axes = np.stack([body.e1, body.e2, body.e3])
+    of = found["body"] == list(snapshot.bodies).index("head")
+    away = (found.points - body.position) @ axes.T
+    on = np.linalg.norm(away / SIZE, axis=1)
+    np.testing.assert_allclose(on[of & (found["axis"] == 0)], 1.0, atol=1e-6)
+    for k in range(3):
+        tip = away[of & (found["axis"] == k + 1)][1]
+        np.testing.assert_allclose(tip, BEYOND * SIZE * np.eye(3)[k], atol=1e-6)
+    rigid = body.velocity + np.cross(body.spin, found.points - body.position)
+    np.testing.assert_allclose(found["velocity"][of], rigid[of], atol=1e-5)
+    assert np.linalg.norm(body.spin) > 0.01
+    np.testing.assert_allclose(ends[0][-1, 0], body.position + 0.2 * body.e1, atol=1e-12)
+
+
+def test_an_outline_is_the_shadow_of_the_surface(path):
+    """No point of the surface is outside of it, and some are on it."""
+    import pyvista
+
+    with RunFile(path) as file:
+        snapshot = file.snapshot(-1)
+        found = pyvista.wrap(body_surfaces(file, snapshot))
+    body = snapshot.bodies["head"]
+    arms = (SIZE[:, None] * np.stack([body.e1, body.e2, body.e3]))[:, [0, 2]]
+    inverse = np.linalg.inv(arms.T @ arms)
+    ring = outline(arms)
+    np.testing.assert_allclose(np.einsum("ki,ij,kj->k", ring, inverse, ring), 1.0, atol=1e-9)
+    of = (found["body"] == list(snapshot.bodies).index("head")) & (found["axis"] == 0)
+    seen = (found.points[of] - body.position)[:, [0, 2]]
+    inside = np.einsum("ki,ij,kj->k", seen, inverse, seen)
+    assert 0.98 < inside.max() < 1.0 + 1e-5
+
+
+def test_paraview_files_have_the_bodies_of_every_output(path, tmp_path):
+    write_vtk(path, tmp_path)
+    with RunFile(path) as file:
+        count = len(file)
+    assert len(list(tmp_path.glob("run_bodies_*.vtp"))) == count
+    assert (tmp_path / "run_bodies.pvd").exists()
+    assert "Block1" in (tmp_path / "run_paraview.py").read_text()
