@@ -19,7 +19,7 @@ from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
 from .attached import Unknowns
 from .body import Body, Motor, Poses
-from .rotation import orthonormal, rotation
+from .rotation import turned
 
 E3 = np.array([0.0, 0.0, 1.0])
 
@@ -57,8 +57,8 @@ class Rows:
     def moved(self, before: Poses, y: np.ndarray) -> Poses:
         """The poses displaced by y (N, m)."""
         end = self.n + 2 * len(self.bodies)
-        turned = [orthonormal(rotation(v) @ axes) for v, axes in zip(self.turns(y), before.axes, strict=True)]
-        return Poses(before.centre + y[self.n : end : 2, :3], np.array(turned), before.angle + y[end:, 0] / self.length)
+        there = [turned(v, axes) for v, axes in zip(self.turns(y), before.axes, strict=True)]
+        return Poses(before.centre + y[self.n : end : 2, :3], np.array(there), before.angle + y[end:, 0] / self.length)
 
     def appended(self, rods: Configuration, poses: Poses) -> Configuration:
         """The configuration of N rows: of the rods, and of bodies and motors."""
