@@ -14,6 +14,7 @@ from ..case.table import ORIGIN
 from ..rods.boundary_conditions import spinning, steady, turned
 from .attached import InBody, attached_ends, check_places
 from .loads import number, triple
+from .supports import supports
 
 if TYPE_CHECKING:
     from ..case.bodies import body as tables
@@ -50,7 +51,9 @@ def _system(case: Case, rods: RodStack) -> RodsWithBodies:
         attachments.append(_attachment(at, number_of, motor, body, begin, rods.system.unknowns))
     parts = [[np.arange(e.where.start, e.where.stop) for e in ends if e.end.body == name] for name in names]
     own = [np.unique(np.concatenate([np.zeros(0, np.int64), *some])) for some in parts]
-    return RodsWithBodies(rods.system, bodies, motors, attachments, own, driven, _outside(rods, own))
+    found = supports(rods, ends, names)
+    together = [own[b] for b in range(len(own))] if found is None else found.together(own)
+    return RodsWithBodies(rods.system, bodies, motors, attachments, own, driven, _outside(rods, together), found)
 
 
 def _outside(rods: RodStack, own: Sequence[np.ndarray]) -> list[Load]:

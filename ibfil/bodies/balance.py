@@ -27,7 +27,7 @@ def balance(
     q: Unknowns,
     m: int,
 ) -> np.ndarray:
-    """The matrix (p, n m) that takes forces (n, m) to what the balances add up, at the configuration ``there``.
+    """The matrix (p, n, m) that takes forces (n, m) to what the balances add up, at the configuration ``there``.
 
     ``nodes`` are those of each body's rods, ``turned`` those of each motor's rod.
     """
@@ -36,16 +36,16 @@ def balance(
     for b, (centre, at) in enumerate(zip(poses.centre, nodes, strict=True)):
         for c in range(3):
             out[6 * b + c, at, c] = 1.0
-        out[q.turns(b), at] = _torques(there, at, centre, m) / q.length
+        out[q.turns(b), at] = torques(there, at, centre, m) / q.length
     for k, (motor, at) in enumerate(zip(motors, turned, strict=True)):
         axes = poses.axes[motor.body]
         point = poses.centre[motor.body] + axes @ motor.point
-        about = np.tensordot(axes @ motor.axis, _torques(there, at, point, m), 1)
+        about = np.tensordot(axes @ motor.axis, torques(there, at, point, m), 1)
         out[q.motor(k), at] = about / q.length
-    return out.reshape(q.size, n * m)
+    return out
 
 
-def _torques(there: Configuration, at: np.ndarray, centre: np.ndarray, m: int) -> np.ndarray:
+def torques(there: Configuration, at: np.ndarray, centre: np.ndarray, m: int) -> np.ndarray:
     """The matrices (3, k, m) that take forces on the nodes ``at`` (k,) to their torque about a point."""
     x, y, z = (there.r[at] - centre).T
     out = np.zeros((3, len(at), m))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..linalg.constraints import Carried, Prescribed
+from ..linalg.constraints import Carried, Clamps, Prescribed
 from ..rods.base import Load
 from ..rods.elastic_force import Moment
 from ..rods.geometry import Configuration
@@ -19,6 +19,7 @@ from .body import Attachment, Poses
 from .end_tangents import EndTangents
 from .rotation import turning
 from .rows import Rows
+from .supports import Supports
 
 Change = Callable[[np.ndarray], np.ndarray]
 
@@ -34,6 +35,7 @@ class Joined(NamedTuple):
     nodes: Sequence[np.ndarray]
     driven: Sequence[np.ndarray]
     outside: Sequence[Load]  # those that are not between a body and its own rods
+    supports: Supports | None = None  # of rods that have several
 
 
 class Carrying:
@@ -43,7 +45,11 @@ class Carrying:
         self.joined, self.rows, self.q = joined, joined.rows, joined.rows.q
         rods, poses = self.rows.rods(there), self.rows.poses(there)
         known = joined.nodes, joined.driven, self.rows.motors
-        self.balance = balance(rods, poses, *known, self.q, self.rows.m)
+        whole = balance(rods, poses, *known, self.q, self.rows.m)
+        if joined.supports is not None:
+            joined.supports.add_left_over(whole, rods, poses, self.q)
+            self._sums = joined.supports.sums(rods, poses, self.rows.motors, self.q, self.rows.m)
+        self.balance = whole.reshape(self.q.size, -1)
 
     def carried(
         self,
@@ -70,6 +76,7 @@ class Carrying:
             change,
             external_columns,
             *self._pushed(poses, turns, time),
+            self._clamps(begin, poses, time, y, tangents),
         )
         return held._replace(carried=follow)
 
@@ -89,6 +96,17 @@ class Carrying:
                 value.append(np.array([turn_of(begin, end.node, at) - y[end.node, 3]]))
                 lever.append(by.turn[None])
         return np.concatenate(value), np.concatenate(lever), tangents
+
+    def _clamps(
+        self, begin: Configuration, poses: Poses, time: float, y: np.ndarray, tangents: Sequence[np.ndarray]
+    ) -> Clamps | None:
+        """What the supports of rods with several of them add to the balances."""
+        joined = self.joined
+        if joined.supports is None:
+            return None
+        places = [place(end, self.rows.motors, poses).tangent for end in joined.ends]
+        mesh = joined.tangents.turned(joined.rods.mesh, [tangent for tangent in places if tangent is not None])
+        return joined.supports.clamps(self._sums, mesh, begin, y[: self.rows.n], time, tangents)
 
     def _elastic(
         self, rods: Configuration, begin: Configuration, moment: Moment, tangents: Sequence[np.ndarray]

@@ -6,6 +6,8 @@ is a stencil of one node: the kernels of the Jacobian do the rest.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..rods import elastic_jacobian
@@ -30,6 +32,13 @@ class EndTangents:
         self.nodes, self._n, self.slope = nodes, n, w2[nodes, 0]
         self._mesh = mesh._replace(first=np.arange(n), w1=w1, w2=w2)
         self._stencils = elastic_jacobian.stencils(self._mesh)
+
+    def turned(self, mesh: Mesh, tangents: Sequence[np.ndarray]) -> Mesh:
+        """The rods' mesh with these tangents (3,) at the ends."""
+        c1, c2 = mesh.c1.copy(), mesh.c2.copy()
+        for node, slope, tangent in zip(self.nodes, self.slope, tangents, strict=True):
+            c1[node], c2[node] = tangent, slope * tangent
+        return mesh._replace(c1=c1, c2=c2)
 
     def begin(self, configuration: Configuration, start: Configuration, m: int) -> Linearization:
         """Columns to be filled: by ``elastic``, and by loads as they fill a stiffness."""

@@ -25,6 +25,7 @@ from .body import Attachment, Body, Motor, Poses
 from .carrying import Carrying, Joined
 from .end_tangents import EndTangents
 from .rows import Rows
+from .supports import Supports
 
 FURTHEST = 1.0  # radian: the largest turn of a body within a step
 
@@ -38,6 +39,8 @@ class RodsWithBodies(RodSystem):
 
     ``nodes`` (one array a body) are all nodes of the body's rods, ``turned`` (one array a motor) those of the rod that
     it turns, ``outside`` the loads that act from outside on a body's rods: not what acts between these.
+
+    ``supports`` are those of rods that have several, and of the bodies there; None where there are none.
     """
 
     def __init__(
@@ -49,6 +52,7 @@ class RodsWithBodies(RodSystem):
         nodes: Sequence[np.ndarray],
         turned: Sequence[np.ndarray],
         outside: Sequence[Load],
+        supports: Supports | None = None,
     ) -> None:
         self.rods, self.motors, self.attached = rods, tuple(motors), tuple(ends)
         self.nodes, self.driven = nodes, turned
@@ -64,7 +68,8 @@ class RodsWithBodies(RodSystem):
         self._anchored[index[index % self.unknowns < 3] // self.unknowns] = True
         self._anchored[[end.node for end in ends]] = True
         at = np.concatenate([self._unknowns_of(end) for end in ends] or [np.zeros(0, np.int64)])
-        self._joined = Joined(rods, self.rows, self.attached, self.tangents, at, nodes, turned, outside)
+        whole, driven = (nodes, turned) if supports is None else supports.alone(nodes, turned)
+        self._joined = Joined(rods, self.rows, self.attached, self.tangents, at, whole, driven, outside, supports)
         self.ends = _Ends(rods.ends, self.rows)
 
     @property
@@ -87,12 +92,8 @@ class RodsWithBodies(RodSystem):
 
     def _mesh(self, places: Sequence[Place]) -> Mesh:
         """The rods' mesh, the tangents of clamped ends as the bodies have them."""
-        mesh = self.rods.mesh
-        c1, c2 = mesh.c1.copy(), mesh.c2.copy()
-        for k, slope in zip(self.clamps, self.tangents.slope, strict=True):
-            node, tangent = self.attached[k].node, places[k].tangent
-            c1[node], c2[node] = tangent, slope * tangent
-        return mesh._replace(c1=c1, c2=c2)
+        found = [place.tangent for place in places if place.tangent is not None]
+        return self.tangents.turned(self.rods.mesh, found)
 
     def move(self, start: Configuration, y: np.ndarray) -> Configuration:
         """The configuration displaced by y (N, m) from ``start``."""

@@ -24,6 +24,11 @@ from .velocity_gradient import advected, gradient
 _CURVING = 1e-2  # of a body's size: the step of second differences of a flow
 
 
+Solved = tuple[
+    tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]
+]  # displacements and forces: at dq = 0, by dq
+
+
 class BodyDrag(NamedTuple):
     """The resistances of bodies in their axes (b, 3), their semi-axes (b, 3) for flows, and the length of turns."""
 
@@ -127,7 +132,9 @@ class _Bordered(_Response):
         first, each = solve(right), np.array([solve(x) for x in flat.reshape(-1, n, m)])
         felt = resist(self.drag, self.e3, inverse * (moved[:n] + first))
         by_each = np.array([resist(self.drag, self.e3, inverse * x) for x in each])
-        dq, own = self._bodies(held, carried, (first, felt), (each, by_each), y, moved)
+        known = (first, felt), (each, by_each)
+        clamped = self._clamped(carried, force, known, rows)
+        dq, own = self._bodies(held, carried, known, y, moved, clamped)
         d = np.concatenate([first + np.tensordot(dq, each, 1), _spread(dq, carried, y.shape, n)])
         felt = felt + np.tensordot(dq, by_each, 1)
         rest = felt - force[:n] - carried.columns @ dq
@@ -145,8 +152,26 @@ class _Bordered(_Response):
         blocks = pairs.blocks * free[pairs.rows][:, :, None]
         return self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))
 
-    def _bodies(self, held: Prescribed, carried: Carried, first, each, y: np.ndarray, moved: np.ndarray):
+    def _clamped(
+        self, carried: Carried, force: np.ndarray, known: Solved, rows: _Rows | None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """What supports add to the balances: at dq = 0 (p,), and by dq (p, p). ``rows`` of K; None: forces stay."""
+        own, ((first, felt), (others, by_each)) = carried.clamps, known
+        if own is None:
+            return None
+        at = own.nodes
+        now, by = felt[at] - force[at], by_each[:, at] - carried.columns[at].transpose(2, 0, 1)
+        if rows is not None:
+            there = np.searchsorted(rows.nodes, at)
+            now = now - rows.times(first)[there]
+            by = by - np.array([rows.times(x)[there] for x in others])
+        value = np.einsum("pem,em->p", own.sums, now) + own.moment + own.by_nodes @ first.ravel()
+        slope = np.einsum("pem,qem->pq", own.sums, by) + own.by_nodes @ others.reshape(len(others), -1).T
+        return value, slope + own.by_tangents
+
+    def _bodies(self, held: Prescribed, carried: Carried, known: Solved, y: np.ndarray, moved: np.ndarray, clamped):
         """dq (p,) from the balances, and for the rows of bodies (N - n, m) the force on the fluid and the reaction."""
+        first, each = known
         n, m, p = self._n, y.shape[1], len(carried.by)
         drag = self._matrix(p) + np.diag(carried.drag)
         matrix = (drag / self.tau) - carried.slope
@@ -159,9 +184,11 @@ class _Bordered(_Response):
         matrix += carried.balance @ by_each.reshape(p, n * m).T
         rate = moved.ravel()[carried.by] / self.tau
         short = carried.want - carried.balance @ (felt - loaded).ravel() - drag @ rate
+        if clamped is not None:
+            short, matrix = short - clamped[0], matrix + clamped[1]
         given = np.isin(carried.by, held.at)
-        known = dict(zip(held.at.tolist(), held.value.tolist(), strict=True))
-        fixed = np.array([known[k] for k in carried.by[given].tolist()]) - y.ravel()[carried.by[given]]
+        values = dict(zip(held.at.tolist(), held.value.tolist(), strict=True))
+        fixed = np.array([values[k] for k in carried.by[given].tolist()]) - y.ravel()[carried.by[given]]
         whole, right = matrix.copy(), short.copy()
         whole[given] = np.eye(p)[given]
         right[given] = fixed
@@ -184,8 +211,10 @@ class _Bordered(_Response):
         each = each.reshape(-1, n, m)
         felt = resist(self.drag, self.e3, (first - base[:n]) / self.tau)
         by_each = np.array([resist(self.drag, self.e3, x / self.tau) for x in each])
-        still = carried._replace(external_change=None, slope=np.zeros_like(carried.slope))
-        dq, own = self._bodies(held, still, (first, felt), (each, by_each), np.zeros_like(force), -base)
+        still = _frozen(carried)
+        known = (first, felt), (each, by_each)
+        clamped = self._clamped(still, force, known, None)
+        dq, own = self._bodies(held, still, known, np.zeros_like(force), -base, clamped)
         y = np.concatenate([first + np.tensordot(dq, each, 1), _spread(dq, carried, force.shape, n)])
         felt = felt + np.tensordot(dq, by_each, 1)
         reaction = np.zeros_like(force)
@@ -206,3 +235,13 @@ def _spread(dq: np.ndarray, carried: Carried, shape: tuple[int, ...], n: int) ->
     out = np.zeros(shape)
     out.ravel()[carried.by] = dq
     return out[n:]
+
+
+def _frozen(carried: Carried) -> Carried:
+    """The same where forces stay as they are."""
+    clamps = carried.clamps
+    if clamps is not None:
+        zero = np.zeros_like(clamps.by_tangents)
+        clamps = clamps._replace(by_nodes=np.zeros_like(clamps.by_nodes), by_tangents=zero)
+    columns, slope = np.zeros_like(carried.columns), np.zeros_like(carried.slope)
+    return carried._replace(columns=columns, external_change=None, slope=slope, clamps=clamps)

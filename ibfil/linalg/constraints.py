@@ -8,6 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 
+class Clamps(NamedTuple):
+    """The part of balances by supports of rods with several of them, by their reactions R (e, m), linear in a step:
+
+    sums R + moment + by_nodes d + by_tangents dq
+    """
+
+    nodes: np.ndarray  # (e,)
+    sums: np.ndarray  # (p, e, m)
+    moment: np.ndarray  # (p,)
+    by_nodes: np.ndarray  # (p, n m)
+    by_tangents: np.ndarray  # (p, p)
+
+
 class Carried(NamedTuple):
     """Unknowns that bodies carry, and the balances that the bodies' own unknowns q (p,) obey; n nodes, N rows.
 
@@ -28,6 +41,7 @@ class Carried(NamedTuple):
     want: np.ndarray  # (p,)
     slope: np.ndarray  # (p, p)
     drag: np.ndarray  # (p,) against the rates of q, besides the fluid's
+    clamps: Clamps | None = None  # of bodies whose rods have other supports too
 
 
 class Prescribed(NamedTuple):

@@ -129,8 +129,8 @@ def test_a_wrong_sign_in_the_balance_would_be_seen(monkeypatch, component):
         out[:, :, component] *= -1.0
         return out
 
-    right = balance._torques
-    monkeypatch.setattr(balance, "_torques", wrong)
+    right = balance.torques
+    monkeypatch.setattr(balance, "torques", wrong)
     assert largest_imbalance(SWIMMER, ELLIPSOID)[1] > 1e-4
 
 

@@ -69,10 +69,6 @@ def _motor(key: str, motor: Motor, end: End, filament: Filament) -> Iterator[Fau
         yield Fault(key, "a motor and no twisting", "only with twisting, the twist modulus C", (key,))
     if end.hinged:
         yield Fault(key, "a motor at a hinged end, which it could not turn", "hinged = false")
-    other = filament.finish if end is filament.start else filament.start
-    if other.held:
-        found = f'a motor on a filament whose other end has end = "{other.end}"'
-        yield Fault(key, found, "the other end free")
     given = [name for name in ("spin", "angle", "torque", "stall") if getattr(motor, name) is not None]
     if len(given) != 1:
         yield Fault(key, " and ".join(given) or "nothing", "one of spin, angle, torque, or stall with free")
@@ -87,16 +83,11 @@ def _motor(key: str, motor: Motor, end: End, filament: Filament) -> Iterator[Fau
 
 
 def _filament(key: str, filament: Filament) -> Iterator[Fault]:
-    """A filament in a body: not in two, nor held elsewhere, alone, and begun by the case itself."""
-    first, last = filament.start, filament.finish
-    reads = (f"{key}.start", f"{key}.finish")
-    if first.attached and last.attached and first.body != last.body:
-        found = f"{shown(first.body)} and {shown(last.body)}, a filament between two bodies"
-        yield Fault(f"{key}.finish.body", found, "one body a filament", reads)
-    elif first.held and last.held and not (first.attached and last.attached):
-        held = "start" if last.attached else "finish"
-        found = f'"{getattr(filament, held).end}", the other end in a body'
-        yield Fault(f"{key}.{held}.end", found, "free; hold the body, by motion", reads)
+    """A filament in a body: not one of copies, and begun by the case itself."""
+    first, last, reads = filament.start, filament.finish, (f"{key}.start", f"{key}.finish")
+    if first.attached and last.attached and first.body == last.body and (first.motor or last.motor):
+        found = f"{shown(last.body)}, as the start has, and a motor, which would turn it against itself"
+        yield Fault(f"{key}.finish.body", found, "another body, or no motor", reads)
     if filament.copies is not None:
         yield Fault(f"{key}.copies", "copies of a filament in a body", "a filament and a body for each", reads)
     if isinstance(filament.shape, RunShape):
