@@ -100,7 +100,7 @@ class Carrying:
     def _clamps(
         self, begin: Configuration, poses: Poses, time: float, y: np.ndarray, tangents: Sequence[np.ndarray]
     ) -> Clamps | None:
-        """What the supports of rods with several of them add to the balances."""
+        """The part of the balances by supports of rods with several of them."""
         joined = self.joined
         if joined.supports is None:
             return None

@@ -155,7 +155,7 @@ class _Bordered(_Response):
     def _clamped(
         self, carried: Carried, force: np.ndarray, known: Solved, rows: _Rows | None
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """What supports add to the balances: at dq = 0 (p,), and by dq (p, p). ``rows`` of K; None: forces stay."""
+        """The part of supports in the balances: at dq = 0 (p,), and by dq (p, p). ``rows`` of K; None: forces stay."""
         own, ((first, felt), (others, by_each)) = carried.clamps, known
         if own is None:
             return None
