@@ -186,9 +186,9 @@ class _Bordered(_Response):
         short = carried.want - carried.balance @ (felt - loaded).ravel() - drag @ rate
         if clamped is not None:
             short, matrix = short - clamped[0], matrix + clamped[1]
-        given = np.isin(carried.by, held.at)
-        values = dict(zip(held.at.tolist(), held.value.tolist(), strict=True))
-        fixed = np.array([values[k] for k in carried.by[given].tolist()]) - y.ravel()[carried.by[given]]
+        found = carried.by[:, None] == held.at
+        given = found.any(axis=1)
+        fixed = held.value[np.nonzero(found)[1]] - y.ravel()[carried.by[given]]
         whole, right = matrix.copy(), short.copy()
         whole[given] = np.eye(p)[given]
         right[given] = fixed

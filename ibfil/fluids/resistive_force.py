@@ -216,7 +216,7 @@ class _Rows(NamedTuple):
         """(K d) at the nodes (k, m)."""
         m = d.shape[1]
         w = (self.band.shape[2] // m - 1) // 2
-        padded = np.pad(d, ((w, w), (0, 0)))
+        padded = np.concatenate([np.zeros((w, m)), d, np.zeros((w, m))])
         rows = zip(self.band, self.nodes, strict=True)
         out = np.array([row @ padded[i : i + 2 * w + 1].ravel() for row, i in rows]).reshape(-1, m)
         if self.pairs.rows.size:
