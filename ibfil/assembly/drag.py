@@ -103,8 +103,14 @@ def body_drag(case: Case, stacked: RodStack) -> BodyDrag:
     from ..bodies.resistance import Resistance, ellipsoid
     from ..fluids.resistive_bodies import BodyDrag
 
-    none = Resistance(np.zeros(3), np.zeros(3), np.zeros(3))
-    sizes = [np.array(body.shape.semi_axes) for body in case.bodies.values()]
-    found = [ellipsoid(size, case.fluid.viscosity) if size.any() else none for size in sizes]
+    found = []
+    for body in case.bodies.values():
+        size, given = np.array(body.shape.semi_axes), body.resistance
+        if given is not None:
+            found.append(Resistance(np.array(given.translation), np.array(given.rotation), size))
+        elif size.any():
+            found.append(ellipsoid(size, case.fluid.viscosity))
+        else:
+            found.append(Resistance(np.zeros(3), np.zeros(3), size))
     moved, turned, axes = (np.array(column) for column in zip(*found, strict=True))
     return BodyDrag(moved, turned, axes, stacked.system.length)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ..case.bodies.end import End
     from ..case.bodies.motor import Motor
 
+UNWATCHED = ["how fast disturbances of the rods grow is not looked at with bodies: try a shorter time.step"]
 ABSENT_OF_BODIES = ["contact of bodies, with each other and with rods", "mass of bodies"]
 
 

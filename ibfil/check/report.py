@@ -16,7 +16,7 @@ from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
 from ..simulation.steps import AUTOMATIC_ERROR, POINTS_A_PERIOD
 from ..timestepping.step_control import equal_parts
-from .bodies import ABSENT_OF_BODIES, in_body, of_body
+from .bodies import ABSENT_OF_BODIES, UNWATCHED, in_body, of_body
 from .budget import disk, memory, shares, terms
 from .dimensionless import groups, oscillations
 from .warnings import warnings
@@ -205,6 +205,7 @@ def _steps(simulation: Simulation) -> list[str]:
         *lines,
         f"explicit scheme: {limit}",
         "implicit and semi-implicit schemes: no such limit; accuracy decides",
+        *UNWATCHED[: bool(case.bodies)],
         *simulation.model.fluid_model.step_lines(),
         *_driven(simulation),
         f"slowest bending time: {simulation.bending_time():.4g}",
@@ -221,8 +222,6 @@ def _automatic(simulation: Simulation) -> list[str]:
             "the length over the run lets it"
         )
     growth = simulation.growth_rate()
-    if simulation.case.bodies:
-        lines.append("  how fast disturbances of the rods grow is not looked at in scenes with bodies")
     if growth:
         lines.append(
             f"  at first no longer than {2 * np.pi / growth / POINTS_A_PERIOD:.3g}: disturbances of the rods grow or "

@@ -63,6 +63,11 @@ class BodySnapshot:
     reaction: np.ndarray | None = None  # (3,) force that holds or moves it; None where it is free
     reaction_torque: np.ndarray | None = None  # (3,) the same, about its centre
 
+    @property
+    def power(self) -> float:
+        """Power of the body itself on the fluid."""
+        return float(self.force @ self.velocity + self.torque @ self.spin)
+
 
 @dataclass(frozen=True)
 class MotorSnapshot:

@@ -155,7 +155,7 @@ class Efficiency(OfFilament, kind="efficiency"):
 
     The power that would draw the straight filament along itself as fast as it swims, by the paper's drag in
     every fluid, over the power it spends. U is the centroid's displacement (along `along` where given) since
-    the start of `over`, per time, P the mean of `Power` since then.
+    the start of `over`, per time, P the mean of `Power` since then, and of that of the bodies it is in.
     """
 
     keys = ("along", "over")
@@ -165,6 +165,7 @@ class Efficiency(OfFilament, kind="efficiency"):
     def __init__(self, case: Case, observe: Observe) -> None:
         super().__init__(case, observe)
         self._drag = 2 * np.pi * case.fluid.viscosity * self.length
+        self._bodies = {end.body for end in (self.model.start, self.model.finish) if end.attached}
         self._begin: tuple[float, np.ndarray] | None = None
         self._before = (0.0, 0.0)  # time and power at the last output
         self._work = 0.0
@@ -173,7 +174,7 @@ class Efficiency(OfFilament, kind="efficiency"):
         """Return the efficiency since the start of `over`."""
         filament, time = self.look(snapshot), snapshot.time
         centroid = self.share @ filament.position
-        power = float(np.sum(filament.power))
+        power = float(np.sum(filament.power)) + sum(snapshot.bodies[name].power for name in self._bodies)
         last, self._before = self._before, (time, power)
         if self._begin is None:
             if self.over is None or time >= self.over[0] - 1e-9 * abs(time):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..io.snapshots import FilamentSnapshot, Snapshot
-from .base import ObservableBase, Unfit, Value
+from .base import Unfit, Value
 from .local import SUMMARY, OfFilament, distance_across
 from .location import Location
 
@@ -127,21 +127,6 @@ class Power(Windowed, kind="power"):
         """At one output."""
         filament = self.look(snapshot)
         return float(np.sum(filament.power[self.inside]))
-
-
-class Dissipation(ObservableBase, kind="dissipation"):
-    """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
-
-    On a grid it costs an evaluation of the fluid at each output.
-    """
-
-    keys: ClassVar[tuple[str, ...]] = SUMMARY
-    dimension = "force length/time"
-    description = "power turned into heat by the fluid, filaments together, one"
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        return float(snapshot.diagnostics["dissipation"])
 
 
 def _lab_moment(filament: FilamentSnapshot, s: np.ndarray, node: int) -> np.ndarray:

@@ -61,6 +61,26 @@ def test_a_body_by_itself_moves_and_resists_as_stokes_says():
     np.testing.assert_allclose(now["c"].e1, [np.cos(0.5), np.sin(0.5), 0], atol=1e-12)
 
 
+def test_a_given_resistance_goes_before_that_of_the_shape():
+    """Along and about the body's own axes."""
+    given = "resistance = { translation = [2, 4, 8], rotation = [3, 6, 12] }\naxes = [[0, 1, 0], [-1, 0, 0]]\n"
+    now = scene(body(more=given + "force = [1, 1, 1]\ntorque = [1, 1, 1]")).snapshot().bodies["b"]
+    np.testing.assert_allclose(now.velocity, [1 / 4, 1 / 2, 1 / 8], atol=1e-12)
+    np.testing.assert_allclose(now.spin, [1 / 6, 1 / 3, 1 / 12], rtol=0.05)  # over a step, in which it turns
+
+
+def test_the_heat_of_drag_is_the_power_where_the_fluid_is_at_rest():
+    """Of rods and bodies; and the efficiency counts the body."""
+    observed = '[observe.d]\nkind = "dissipation"\n'
+    sim = scene(ELLIPSOID + observed, SWIMMER)
+    sim.advance(0.1, lambda: None)
+    now = sim.snapshot()
+    own = float(now.filaments["tail"].power.sum())
+    assert now.diagnostics["dissipation"] == pytest.approx(now.diagnostics["power"], rel=1e-12)
+    assert own + now.bodies["b"].power == pytest.approx(now.diagnostics["power"], rel=1e-12)
+    assert now.bodies["b"].power > 0.01 * own
+
+
 def test_an_ellipsoid_in_a_shear_turns_as_jeffery_says():
     """Half of the period 2 pi (r + 1/r)/rate later it points the other way, and half way it did not in between."""
     period = 2 * np.pi * (3 + 1 / 3)

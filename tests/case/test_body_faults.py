@@ -114,6 +114,11 @@ CASES = {
         ],
         f"{HEAD}.torque: found a torque on a joint of hinged ends; allowed: an end in it that is not hinged",
     ),
+    "a resistance of a joint": (
+        [HEAD + '={shape={kind="joint"},resistance={translation=[1,1,1],rotation=[1,1,1]}}'],
+        f"{HEAD}.resistance: found a resistance of a joint; allowed: another shape, or none",
+    ),
+    "thick rods": (["fluid.thick=true"], "fluid.thick: found true in a scene with bodies; allowed: false"),
     "no size": (
         [f"{HEAD}.shape.radius=0"],
         f"{HEAD}.shape.radius: found 0; allowed: a number (or constant expression) > 0",

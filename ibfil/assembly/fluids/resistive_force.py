@@ -104,7 +104,9 @@ class ResistiveForceModel(FluidModel):
 
         out = []
         for name, body in self.case.bodies.items():
-            if any(body.shape.semi_axes):
+            if body.resistance is not None:
+                out.append(f"drag of {name}: as given (resistance)")
+            elif any(body.shape.semi_axes):
                 found = ellipsoid(np.array(body.shape.semi_axes), 1.0)[:2]
                 moved, turned = (", ".join(f"{x:.4g}" for x in dict.fromkeys(np.round(part, 12))) for part in found)
                 out.append(f"drag of {name}: {moved} eta along its axes, {turned} eta about them (in unbounded fluid)")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field
 
 from ..table import ZERO, Table
-from ..values import Listed, TripleT, Vector, by_kind, tagged
+from ..values import Listed, Sizes, TripleT, Vector, by_kind, tagged
 from .shapes import Ellipsoid, Joint, Sphere
 
 STILL = (ZERO, ZERO, ZERO)
@@ -20,6 +20,13 @@ class Motion(Table):
     turns: TripleT = Field(STILL, description="rotation vector since t = 0, axis times angle, in the lab")
 
 
+class Resistance(Table):
+    """The resistance of a body along and about its axes."""
+
+    translation: Sizes = Field(description="force per velocity along its three axes", examples=[[1.0, 1.0, 1.0]])
+    rotation: Sizes = Field(description="torque per rate about its three axes", examples=[[1.0, 1.0, 1.0]])
+
+
 class Body(Table):
     """A rigid body, which ends of filaments may be attached to."""
 
@@ -29,6 +36,7 @@ class Body(Table):
         | Annotated[Joint, tagged("joint")],
         by_kind("sphere", "sphere", "ellipsoid", "joint"),
     ] = Field(description="its shape", examples=[{"kind": "sphere", "radius": 0.1}])
+    resistance: Resistance | None = Field(None, description="rft: its own, instead of that of its shape")
     position: Vector | None = Field(
         None,
         description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod",

@@ -107,6 +107,8 @@ def _body(key: str, body: Body, ends: list[End]) -> Iterator[Fault]:
         yield Fault(f"{key}.frame", '"body" and neither force nor torque', "only with one of them")
     if not isinstance(body.shape, Joint):
         return
+    if body.resistance is not None:
+        yield Fault(f"{key}.resistance", "a resistance of a joint", "another shape, or none", (f"{key}.shape",))
     if len(ends) < 2:
         found = f"a joint with {len(ends) or 'no'} end{'s' if not ends else ''} of filaments in it"
         yield Fault(f"{key}.shape", found, "at least two ends", ("filament",))
@@ -127,6 +129,8 @@ def _scene(case: Scene) -> Iterator[Fault]:
     if case.time.scheme != "implicit":
         found = f'a body with time.scheme = "{case.time.scheme}"'
         yield Fault(key, found, 'bodies with scheme = "implicit"', ("time.scheme",))
+    if case.fluid.thick:
+        yield Fault("fluid.thick", "true in a scene with bodies", "false", (key,))
     for name, filament in case.filaments.items():
         own = f"filament.{name}"
         if filament.force == "torque-free":
