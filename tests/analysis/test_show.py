@@ -209,6 +209,7 @@ def test_a_run_without_observables_fields_or_stretch_is_drawn_too(run):
         path=run.path,
         time=run.time,
         filaments=run.filaments,
+        bodies={},
         grid=None,
         observables={},
         diagnostics={"power": run.diagnostics["power"]},
