@@ -10,9 +10,25 @@ if TYPE_CHECKING:
     from ..case.bodies.body import Body
     from ..case.bodies.end import End
     from ..case.bodies.motor import Motor
+    from ..case.schema import Case
 
 UNWATCHED = ["how fast disturbances of the rods grow is not looked at with bodies: try a shorter time.step"]
 ABSENT_OF_BODIES = ["contact of bodies, with each other and with rods", "mass of bodies"]
+
+
+def of_given_motion(case: Case) -> list[str]:
+    """Warnings about motions that are not zero as the run begins, and so do not move at once."""
+    out = []
+    for name, body in case.bodies.items():
+        motion = body.given_motion
+        for key, given in () if motion is None else (("moves", motion.moves), ("turns", motion.turns)):
+            begins = [float(part.bind("t")(0.0)) for part in given]
+            if any(begins):
+                out.append(
+                    f"body.{name}.motion.{key}: {begins} at t = 0, when the body stands as position and axes put it: "
+                    "only the change from there moves it; begin at 0"
+                )
+    return out
 
 
 def in_body(side: str, end: End) -> str:

@@ -15,6 +15,7 @@ from ..case.table import expressions
 from ..shapes import initial
 from ..simulation import steps
 from ..simulation.thermal_step import MOVE, RINGING, TURN, KickSizes, sizes_of_step
+from .bodies import of_given_motion
 from .dimensionless import of_filament, oscillations
 from .twist import of_twist
 
@@ -48,7 +49,14 @@ def warnings(simulation: Simulation) -> list[str]:
         out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
         if filament.closed:
             out += _of_closed(key, filament, case)
-    return out + _of_given_step(simulation) + _of_links(simulation) + _of_run(simulation) + fluid.warnings(simulation)
+    return (
+        out
+        + of_given_motion(case)
+        + _of_given_step(simulation)
+        + _of_links(simulation)
+        + _of_run(simulation)
+        + fluid.warnings(simulation)
+    )
 
 
 def _of_waves(key: str, groups: Mapping[str, float]) -> list[str]:

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from ..bodies.body import Poses
     from .model import Model
 
+_THIN = 0.01  # of the length: rods turn about themselves as if nodes were so far away
+
 
 def body_rate(model: Model, time: float) -> float:
     """The rate, radians a time, at a time: turning by an angle, or, a turn a rod's length, moving along.
@@ -24,11 +26,11 @@ def body_rate(model: Model, time: float) -> float:
         force, torque = body.pushed(poses.axes[b], time)
         moved, turned = _drags(model, system.nodes[b], poses.centre[b])
         moved += 6 * np.pi * model.case.fluid.viscosity * sizes[b]
-        turned += 8 * np.pi * model.case.fluid.viscosity * sizes[b] ** 3
+        turned += 8 * np.pi * model.case.fluid.viscosity * sizes[b] ** 3 * np.eye(3)
         if body.moves is None:
             found.append(2 * np.pi * float(np.linalg.norm(force)) / (moved * length))
         if body.turns is None:
-            found.append(float(np.linalg.norm(torque)) / turned)
+            found.append(float(np.linalg.norm(np.linalg.solve(turned, torque))))
     for k, motor in enumerate(system.motors):
         if motor.torque is not None:
             rod = _about_axis(model, k, poses)
@@ -47,10 +49,13 @@ def _of_nodes(model: Model, nodes: np.ndarray) -> np.ndarray:
     return found
 
 
-def _drags(model: Model, nodes: np.ndarray, centre: np.ndarray) -> tuple[float, float]:
-    """The drag of nodes against moving, and against turning about a point."""
-    drag, r = _of_nodes(model, nodes), model.rods.start.r[nodes]
-    return float(drag.sum()), float(drag @ np.sum((r - centre) ** 2, axis=1))
+def _drags(model: Model, nodes: np.ndarray, centre: np.ndarray) -> tuple[float, np.ndarray]:
+    """The drag of nodes against moving, and against turning about a point (3, 3)."""
+    drag, away = _of_nodes(model, nodes), model.rods.start.r[nodes] - centre
+    least = _THIN * model.rods.system.length
+    square = np.sum(away**2, axis=1) + least**2
+    turned: np.ndarray = (drag @ square) * np.eye(3) - np.einsum("i,ia,ib->ab", drag, away, away)
+    return float(drag.sum()), turned
 
 
 def _about_axis(model: Model, k: int, poses: Poses) -> float:
@@ -60,4 +65,4 @@ def _about_axis(model: Model, k: int, poses: Poses) -> float:
     axis = poses.axes[motor.body] @ motor.axis
     away = model.rods.start.r[nodes] - poses.centre[motor.body] - poses.axes[motor.body] @ motor.point
     across = np.sum(away**2, axis=1) - (away @ axis) ** 2
-    return float(_of_nodes(model, nodes) @ np.maximum(across, (0.01 * system.length) ** 2))
+    return float(_of_nodes(model, nodes) @ np.maximum(across, (_THIN * system.length) ** 2))

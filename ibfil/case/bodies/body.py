@@ -16,8 +16,8 @@ STILL = (ZERO, ZERO, ZERO)
 class Motion(Table):
     """A motion that is given."""
 
-    moves: TripleT = Field(STILL, description="displacement of the centre since t = 0")
-    turns: TripleT = Field(STILL, description="rotation vector since t = 0, axis times angle, in the lab")
+    moves: TripleT = Field(STILL, description="displacement of the centre; what counts is its change since t = 0")
+    turns: TripleT = Field(STILL, description="rotation vector, axis times angle, in the lab; likewise")
 
 
 class Resistance(Table):
