@@ -51,12 +51,13 @@ def carried(flow_at: np.ndarray, gradient: np.ndarray, curving: np.ndarray, axes
     """Velocity and rate (3,), in the body's axes, of a body of semi-axes (3,) that nothing pushes or turns.
 
     ``flow_at`` (3,) is the flow at its centre, ``gradient`` (3, 3) its d_j u_i and ``curving`` (3, 3) its d_j d_j u_i,
-    column j along axis j, all in the body's axes.
+    column j along axis j, all in the body's axes. A joint, which has no size, goes along as a point does.
     """
     square, strain = axes**2, 0.5 * (gradient + gradient.T)
     spin = 0.5 * np.array(
         [gradient[2, 1] - gradient[1, 2], gradient[0, 2] - gradient[2, 0], gradient[1, 0] - gradient[0, 1]]
     )
-    aspect = np.array([(square[j] - square[k]) / (square[j] + square[k]) for j, k in ((1, 2), (2, 0), (0, 1))])
+    pairs = ((1, 2), (2, 0), (0, 1))
+    aspect = np.array([(square[j] - square[k]) / ((square[j] + square[k]) or 1.0) for j, k in pairs])
     across = np.array([strain[1, 2], strain[2, 0], strain[0, 1]])
     return flow_at + curving @ square / 6.0, spin + aspect * across

@@ -229,3 +229,24 @@ def test_rests_and_modes_are_not_of_scenes_with_bodies():
     )
     with pytest.raises(CaseError, match=r"body\.b: found a body; allowed: none; rests and modes"):
         refuse_driven(case)
+
+
+@pytest.mark.parametrize("hinged", ["", ", hinged = true"])
+@pytest.mark.parametrize("shape", ["joint", "ellipsoid"])
+def test_nothing_pulls_at_a_swimmer_in_a_flow(shape, hinged):
+    """Force and torque of rods and body are zero in a shear as in a fluid at rest, with hinges and with clamps."""
+    ends = (("a", 0.0, "finish"), ("b", 0.5, "start"))
+    size = 0.1 if shape == "ellipsoid" else 0.0
+    rods = "".join(
+        half(name, at + (size if end == "start" else -size), end, 'curvature = ["4*sin(7*t)", 0]')
+        for name, at, end in ends
+    ).replace('body = "j"', f'body = "j"{hinged}')
+    more = ", axes = [0.1, 0.05, 0.05]" if size else ""
+    middle = body("j", f'{{ kind = "{shape}"{more} }}', "position = [0.5, 0, 0]")
+    sim = scene(middle, rods, flow='flow = ["2*y", "sin(3*t)", "x"]')
+    sim.advance(0.3, lambda: None)
+    now = sim.snapshot()
+    assert np.linalg.norm(now.bodies["j"].velocity) > 0.1
+    np.testing.assert_allclose(now.diagnostics["net_force"], 0, atol=1e-12)
+    if size or not hinged:  # a joint of hinges has no balance of torque
+        np.testing.assert_allclose(now.diagnostics["net_torque"], 0, atol=1e-12)
