@@ -114,6 +114,12 @@ def without_box(case: Case, rods: Sequence[int], parts: int, whole: float, pair:
     return found
 
 
+def with_markers(case: Case, nodes: int, markers: int, parts: int) -> float:
+    """Seconds of one step by the table with markers of bodies, which are taken out of it once a step."""
+    rods, shell = solved(nodes, parts), _root(markers, 3) + 6.0 * markers * 3 * (parts * nodes) ** 2 * _FLOP
+    return of_rods(case, nodes) + _table(nodes + markers, parts) + shell + _ROUNDS[case.time.scheme] * rods
+
+
 def _table(nodes: int, parts: int) -> float:
     """Seconds of all pairs of nodes in the mobility table."""
     return 0.5 * nodes**2 * _PAIR * (_COMPONENTS if parts == 4 else 1.0)

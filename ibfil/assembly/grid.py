@@ -124,7 +124,7 @@ def coupling(case: Case, stacked: RodStack) -> Coupling:
         return TRANSLATION
     from ..fluids.torque_coupling import TorqueCoupling, spin_mobility
 
-    volume, twists = stacked.system.volume, stacked.twists
+    volume, twists = stacked.system.volume[: stacked.count], stacked.twists[: stacked.count]
     widest = twist_radius(case)
     radius = np.full(len(volume), widest)
     for filament, where in zip(stacked.filaments, stacked.ranges, strict=True):

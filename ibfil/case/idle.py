@@ -22,6 +22,7 @@ def idle_keys(case: Case) -> list[str]:
         idle["fluid"] += [*grid, *wall, "method", "precision"]
         spins = isinstance(fluid.drag, Matched) and fluid.rotation == "grid"
         idle["fluid"] += [] if spins and any(f.twisting for f in case.filaments.values()) else ["rotation"]
+        idle |= {f"body.{name}": ["fit"] for name in case.bodies}
         idle["output"] += ["grid_every", "fields", "grid_stride", "window", "window_at", "probes"]
     else:
         turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())

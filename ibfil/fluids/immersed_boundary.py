@@ -70,6 +70,10 @@ class Immersed:
         """The nodes r (n, 3) with tangents e3 (n, 3) on the grid."""
         return Nodes(*self.stencil(r), self.coupling.axes(e3))
 
+    def pushed(self, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float) -> tuple[Nodes, np.ndarray]:
+        """All nodes that push the fluid, and what each does to it, (n, m), from places, tangents and ``force``."""
+        return self.nodes(r, e3), force
+
     def advected(self, nodes: Nodes, r: np.ndarray, time: float) -> np.ndarray | None:
         """The motions (n, m) with which the background flow carries nodes at r (n, 3); None where there is none."""
         if self.flow is None:

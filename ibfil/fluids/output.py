@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..rods.geometry import Configuration
 from .base import Fluid
 from .coupling import Nodes
 from .fields import GridFields
-from .immersed_boundary import Immersed, ImmersedResponse
+from .immersed_boundary import Immersed
 from .resistive_force import ResistiveForce
 
 
@@ -27,6 +27,13 @@ class FluidOutput(Protocol):
         self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray] | None:
         """The fields in ``names`` on the grid, each (nx, ny, nz[, 3]); None where there is no grid."""
+
+
+class Applies(Protocol):
+    """A response that tells what forces alone do."""
+
+    def apply(self, force: np.ndarray) -> np.ndarray:
+        """Velocities of forces on all nodes that push (flat), without the background flow."""
 
 
 class DragOutput:
@@ -59,10 +66,17 @@ class FieldSource(Protocol):
         """The fields in ``names`` that forces (n, 3), or forces and torques (n, 6), drive; of nodes with stencils."""
 
 
-def _pushes(immersed: Immersed, configuration: Configuration, force: np.ndarray) -> tuple[Nodes, np.ndarray]:
-    """The nodes, and the vectors that they put onto the grid."""
-    nodes = immersed.nodes(configuration.r, configuration.e3)
-    return nodes, immersed.coupling.to_grid(nodes.axes, force)
+class Pushing(NamedTuple):
+    """The nodes that push, those of bodies among them: what each does (n, m), and the vectors that it puts on a grid."""
+
+    nodes: Nodes
+    force: np.ndarray
+    vectors: np.ndarray
+
+
+def _pushing(immersed: Immersed, configuration: Configuration, force: np.ndarray, time: float) -> Pushing:
+    nodes, pushed = immersed.pushed(configuration.r, configuration.e3, force, time)
+    return Pushing(nodes, pushed, immersed.coupling.to_grid(nodes.axes, pushed))
 
 
 class GridOutput:
@@ -75,7 +89,7 @@ class GridOutput:
         self, configuration: Configuration, velocity: np.ndarray, force: np.ndarray, time: float
     ) -> dict[str, float | np.ndarray]:
         """The fluid's heat, the power of the nodes upon the grid, and what slip takes between the two."""
-        nodes, vectors = _pushes(self._immersed, configuration, force)
+        nodes, force, vectors = _pushing(self._immersed, configuration, force, time)
         heat, power = self._fields.dissipation(*nodes.stencil, vectors)
         own = self._immersed.own
         return {
@@ -88,7 +102,7 @@ class GridOutput:
         self, configuration: Configuration, force: np.ndarray, time: float, names: Sequence[str]
     ) -> dict[str, np.ndarray] | None:
         """Fields on the grid: one evaluation of the fluid."""
-        nodes, vectors = _pushes(self._immersed, configuration, force)
+        nodes, _, vectors = _pushing(self._immersed, configuration, force, time)
         return self._fields.evaluate(*nodes.stencil, vectors, time, names)
 
 
@@ -104,10 +118,10 @@ class SpaceOutput:
         """F.M F, the fluid's heat and the power of the nodes upon it in one, and what slip takes besides."""
         own, c = self._immersed.own, self._immersed.coupling.components
         response = self._fluid.response(configuration.r, configuration.e3, time, 1.0)
-        assert isinstance(response, ImmersedResponse)
+        force = self._immersed.pushed(configuration.r, configuration.e3, force, time)[1]
         pushed = np.ascontiguousarray(force[:, :c])
         slip = float(np.sum(own * pushed**2))
-        power = float(pushed.ravel() @ response.apply(pushed.ravel())) - slip
+        power = float(pushed.ravel() @ cast("Applies", response).apply(pushed.ravel())) - slip
         return {"dissipation": power, "grid_power": power, "slip_power": slip}
 
     def evaluate(
@@ -116,5 +130,5 @@ class SpaceOutput:
         """Fields in the window."""
         if self._fields is None:
             return None
-        nodes, vectors = _pushes(self._immersed, configuration, force)
+        nodes, _, vectors = _pushing(self._immersed, configuration, force, time)
         return self._fields.evaluate(*nodes.stencil, vectors, time, names)

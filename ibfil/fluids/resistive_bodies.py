@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..bodies.border import Done, Own, Supported, bordered, frozen, supported
 from ..linalg.constraints import Carried, Prescribed
 from ..linalg.stiffness import Stiffness
 from .base import Solution
@@ -22,11 +23,6 @@ from .resistive_force import Drag, ResistiveForce, _at, _hold, _Response, _Rows,
 from .velocity_gradient import advected, gradient
 
 _CURVING = 1e-2  # of a body's size: the step of second differences of a flow
-
-
-Solved = tuple[
-    tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]
-]  # displacements and forces: at dq = 0, by dq
 
 
 class BodyDrag(NamedTuple):
@@ -132,9 +128,8 @@ class _Bordered(_Response):
         first, each = solve(right), np.array([solve(x) for x in flat.reshape(-1, n, m)])
         felt = resist(self.drag, self.e3, inverse * (moved[:n] + first))
         by_each = np.array([resist(self.drag, self.e3, inverse * x) for x in each])
-        known = (first, felt), (each, by_each)
-        clamped = self._clamped(carried, force, known, rows)
-        dq, own = self._bodies(held, carried, known, y, moved, clamped)
+        known = Done(first, felt), Done(each, by_each)
+        dq, own = self._bodies(held, carried, (*known, self._supports(carried, force, *known, rows)), y, moved)
         d = np.concatenate([first + np.tensordot(dq, each, 1), _spread(dq, carried, y.shape, n)])
         felt = felt + np.tensordot(dq, by_each, 1)
         rest = felt - force[:n] - carried.columns @ dq
@@ -152,51 +147,36 @@ class _Bordered(_Response):
         blocks = pairs.blocks * free[pairs.rows][:, :, None]
         return self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))
 
-    def _clamped(
-        self, carried: Carried, force: np.ndarray, known: Solved, rows: _Rows | None
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """The part of supports in the balances: at dq = 0 (p,), and by dq (p, p). ``rows`` of K; None: forces stay."""
-        own, ((first, felt), (others, by_each)) = carried.clamps, known
+    def _supports(
+        self, carried: Carried, force: np.ndarray, first: Done, each: Done, rows: _Rows | None
+    ) -> Supported | None:
+        """The part of supports in the balances. ``rows`` of K; None: forces stay."""
+        own = carried.clamps
         if own is None:
             return None
         at = own.nodes
-        now, by = felt[at] - force[at], by_each[:, at] - carried.columns[at].transpose(2, 0, 1)
+        now, by = first.felt[at] - force[at], each.felt[:, at] - carried.columns[at].transpose(2, 0, 1)
         if rows is not None:
             there = np.searchsorted(rows.nodes, at)
-            now = now - rows.times(first)[there]
-            by = by - np.array([rows.times(x)[there] for x in others])
-        value = np.einsum("pem,em->p", own.sums, now) + own.moment + own.by_nodes @ first.ravel()
-        slope = np.einsum("pem,qem->pq", own.sums, by) + own.by_nodes @ others.reshape(len(others), -1).T
-        return value, slope + own.by_tangents
+            now = now - rows.times(first.moves)[there]
+            by = by - np.array([rows.times(x)[there] for x in each.moves])
+        return supported(own, now, by, first, each)
 
-    def _bodies(self, held: Prescribed, carried: Carried, known: Solved, y: np.ndarray, moved: np.ndarray, clamped):
+    def _bodies(
+        self,
+        held: Prescribed,
+        carried: Carried,
+        known: tuple[Done, Done, Supported | None],
+        y: np.ndarray,
+        moved: np.ndarray,
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """dq (p,) from the balances, and for the rows of bodies (N - n, m) the force on the fluid and the reaction."""
-        first, each = known
-        n, m, p = self._n, y.shape[1], len(carried.by)
-        drag = self._matrix(p) + np.diag(carried.drag)
-        matrix = (drag / self.tau) - carried.slope
-        loaded = carried.external
-        (a, felt), (others, by_each) = first, each
-        if carried.external_change is not None:
-            loaded = loaded + carried.external_change(a)
-            change = np.array([carried.external_change(x) for x in others])
-            by_each = by_each - change - carried.external_columns.transpose(2, 0, 1)
-        matrix += carried.balance @ by_each.reshape(p, n * m).T
-        rate = moved.ravel()[carried.by] / self.tau
-        short = carried.want - carried.balance @ (felt - loaded).ravel() - drag @ rate
-        if clamped is not None:
-            short, matrix = short - clamped[0], matrix + clamped[1]
-        found = carried.by[:, None] == held.at
-        given = found.any(axis=1)
-        fixed = held.value[np.nonzero(found)[1]] - y.ravel()[carried.by[given]]
-        whole, right = matrix.copy(), short.copy()
-        whole[given] = np.eye(p)[given]
-        right[given] = fixed
-        dq = np.linalg.solve(whole, right)
-        reaction = np.zeros_like(y)
-        reaction.ravel()[carried.by[given]] = (matrix @ dq - short)[given]
-        own = self._own(moved[n:] + _spread(dq, carried, y.shape, n)) / self.tau
-        return dq, (own, reaction[n:])
+        first, each, supports = known
+        rate, drag = moved.ravel()[carried.by] / self.tau, self._matrix(len(carried.by))
+        own = Own(drag @ rate, drag / self.tau)
+        dq, reacted = bordered(held, carried, (first, each, own, supports), y, rate, self.tau)
+        done = self._own(moved[self._n :] + _spread(dq, carried, y.shape, self._n)) / self.tau
+        return dq, (done, _spread(reacted, carried, y.shape, self._n))
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """Nodes by their forces, bodies and the ends they carry by the balances."""
@@ -211,10 +191,10 @@ class _Bordered(_Response):
         each = each.reshape(-1, n, m)
         felt = resist(self.drag, self.e3, (first - base[:n]) / self.tau)
         by_each = np.array([resist(self.drag, self.e3, x / self.tau) for x in each])
-        still = _frozen(carried)
-        known = (first, felt), (each, by_each)
-        clamped = self._clamped(still, force, known, None)
-        dq, own = self._bodies(held, still, known, np.zeros_like(force), -base, clamped)
+        still = frozen(carried)
+        known = Done(first, felt), Done(each, by_each)
+        supports = self._supports(still, force, *known, None)
+        dq, own = self._bodies(held, still, (*known, supports), np.zeros_like(force), -base)
         y = np.concatenate([first + np.tensordot(dq, each, 1), _spread(dq, carried, force.shape, n)])
         felt = felt + np.tensordot(dq, by_each, 1)
         reaction = np.zeros_like(force)
@@ -235,13 +215,3 @@ def _spread(dq: np.ndarray, carried: Carried, shape: tuple[int, ...], n: int) ->
     out = np.zeros(shape)
     out.ravel()[carried.by] = dq
     return out[n:]
-
-
-def _frozen(carried: Carried) -> Carried:
-    """The same where forces stay as they are."""
-    clamps = carried.clamps
-    if clamps is not None:
-        zero = np.zeros_like(clamps.by_tangents)
-        clamps = clamps._replace(by_nodes=np.zeros_like(clamps.by_nodes), by_tangents=zero)
-    columns, slope = np.zeros_like(carried.columns), np.zeros_like(carried.slope)
-    return carried._replace(columns=columns, external_change=None, slope=slope, clamps=clamps)

@@ -80,7 +80,7 @@ class StokesSolve:
         return interpolate(base, weights, self.field(base, weights, force))
 
 
-class _Dense(ImmersedResponse):
+class DenseResponse(ImmersedResponse):
     """The dense mobility matrix (c n, c n); keeps the factors of the last system."""
 
     keeps = True
@@ -150,9 +150,9 @@ class Tabulated(Memoryless, ABC):
 class StokesByTable(Tabulated):
     """IB Stokes by the exact mobility table: a small dense solve with the true operator."""
 
-    def respond(self, nodes: Nodes, flow: np.ndarray | None, tau: float) -> _Dense:
+    def respond(self, nodes: Nodes, flow: np.ndarray | None, tau: float) -> DenseResponse:
         """The whole matrix."""
-        return _Dense(self.immersed, nodes, flow, tau, self.matrix(nodes, self.immersed.own))
+        return DenseResponse(self.immersed, nodes, flow, tau, self.matrix(nodes, self.immersed.own))
 
 
 Block = Callable[[Nodes, np.ndarray, np.ndarray], np.ndarray]  # of nodes, rows (k,), columns (l,)

@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 class FreeModel(ImmersedModel):
     """Stokes flow in free space: all nodes move each other at once, at any distance, and nothing else does."""
 
-    flow_from_forces = True
+    @property
+    def flow_from_forces(self) -> bool:  # type: ignore[override]
+        """Where no bodies push: a run file has the forces of nodes alone."""
+        return not self.case.bodies
 
     @cached_property
     def space(self) -> FreeSpace:
@@ -44,6 +47,8 @@ class FreeModel(ImmersedModel):
         """The exact table, or convolutions, with the preconditioner that the method has."""
         from ...fluids import stokes
 
+        if rods.bodies:
+            return self.with_bodies(rods)
         if method == "table":
             return stokes.StokesByTable(immersed)
         if method == "krylov":
@@ -65,7 +70,7 @@ class FreeModel(ImmersedModel):
         """Heat by the power of the nodes, fields in the window."""
         from ...fluids.output import SpaceOutput
 
-        return SpaceOutput(self.immersed(rods), fluid, self.fields())
+        return SpaceOutput(self.ingredients(rods, fluid), fluid, self.fields())
 
     def fields(self) -> FieldSource | None:
         """The fields in the window; None where there is none."""
@@ -86,6 +91,8 @@ class FreeModel(ImmersedModel):
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
+        if rods.bodies:
+            return self.by_table(rods)
         counts = [where.stop - where.start for where in rods.nodes]
         return costs.without_box(self.case, counts, self.components, self.evaluation(rods))
 

@@ -12,7 +12,7 @@ import numpy as np
 from .. import costs
 from .. import grid as grids
 from ..drag import drag
-from . import grid_warnings
+from . import grid_warnings, shells
 from .base import FluidModel, Term
 
 if TYPE_CHECKING:
@@ -78,24 +78,50 @@ class ImmersedModel(FluidModel):
         """The ingredients of every fluid in this space."""
         from ...fluids import immersed_boundary
 
-        case, space, eta = self.case, self.space, self.case.fluid.viscosity
-        volume = rods.system.volume
+        case, space, eta, n = self.case, self.space, self.case.fluid.viscosity, rods.count
+        volume = rods.system.volume[:n]
         slip = immersed_boundary.slip_mobility(case.fluid.slip, self.kernel, space.spacing, eta, volume)
         local = rods.system.unknowns == 4 and not case.couples_torque
-        spin = drag(case, rods).spin if local else None
+        spin = drag(case, rods).spin[:n] if local else None
         number = np.float32 if case.fluid.single else np.float64
         coupling = grids.coupling(case, rods)
-        twists = rods.twists.astype(float) if local else None
-        return immersed_boundary.Immersed(
-            *(space, self.kernel, eta, slip, spin, self.flow, twists, rods.groups, number, coupling)
-        )
+        twists = rods.twists[:n].astype(float) if local else None
+        parts = (space, self.kernel, eta, slip, spin, self.flow, twists, rods.groups, number, coupling)
+        if not rods.bodies:
+            return immersed_boundary.Immersed(*parts)
+        from ...fluids.shells.stokes import ImmersedBodies
+
+        return ImmersedBodies(*parts, shells.shells(case, rods, case.fluid.kernel, space.spacing))
+
+    def with_bodies(self, rods: RodStack) -> Fluid:
+        """The fluid about rods and bodies, by the exact table."""
+        from ...fluids.shells.stokes import ImmersedBodies, StokesWithBodies
+
+        immersed = self.immersed(rods)
+        assert isinstance(immersed, ImmersedBodies)
+        return StokesWithBodies(immersed)
+
+    def ingredients(self, rods: RodStack, fluid: Fluid) -> Immersed:
+        """Those that a fluid was made of, where it has tables of bodies; made again where it has none."""
+        return getattr(fluid, "immersed", None) if rods.bodies else self.immersed(rods)
+
+    def markers(self) -> int:
+        """How many markers the bodies have."""
+        fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.bodies)
+        return sum(len(found.markers) for found in fits if found is not None)
 
     def method(self, rods: RodStack) -> str:
         """The case's, or the cheapest by counts."""
+        if rods.bodies:
+            return "table"
         if self.case.fluid.method != "auto":
             return self.case.fluid.method
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
+
+    def by_table(self, rods: RodStack) -> dict[str, float]:
+        """Seconds of a step with bodies, from counts: the table of nodes and markers, whose system is that of nodes."""
+        return {"table": costs.with_markers(self.case, rods.count, self.markers(), self.components)}
 
     def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""
@@ -157,7 +183,7 @@ class ImmersedModel(FluidModel):
 
     def memory(self, rods: RodStack) -> dict[str, float]:
         """The mobility table, and what solves with it."""
-        n, m, method = len(rods.s), rods.system.unknowns, self.method(rods)
+        n, m, method = rods.count + self.markers(), rods.system.unknowns, self.method(rods)
         out = {"mobility table": self._number * self.table_entries()}
         if method == "krylov":
             band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
@@ -195,8 +221,8 @@ class ImmersedModel(FluidModel):
         return 0.5 * float(np.sum(turns * np.linalg.solve(pushed, turns)))
 
     def modelled(self) -> list[str]:
-        """Slip, and how rods spin."""
-        out = []
+        """Slip, how rods spin, and what bodies are made of."""
+        out = shells.told(self.case, self.case.fluid.kernel, self.space.spacing)
         if self.case.fluid.slip:
             out += [self._slip(name, filament) for name, filament in self.case.filaments.items()]
         if self.case.couples_torque:
@@ -248,6 +274,10 @@ class ImmersedModel(FluidModel):
             *grid_warnings.of_spin(self.case, name),
             *grid_warnings.of_thickness(self.case, name, self.line_radius),
         ]
+
+    def warnings(self, scene: Scene) -> list[str]:
+        """Bodies that the grid tells badly."""
+        return shells.warnings(self.case, self.case.fluid.kernel, self.space.spacing, self.box)
 
     # -- pictures and recorded runs
 

@@ -45,7 +45,7 @@ class GridModel(ImmersedModel):
         from ...fluids.output import GridOutput
 
         fields = GridFields(self.grid, self.case.fluid.viscosity, self.flow, self.case.compute.threads)
-        return GridOutput(self.immersed(rods), fields)
+        return GridOutput(self.ingredients(rods, fluid), fields)
 
     def solver(self, rods: RodStack, method: str) -> Solver:
         """The solver for velocities by FFT: of the whole grid, or where that is cheaper of the filaments' box."""
@@ -73,6 +73,8 @@ class GridModel(ImmersedModel):
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
+        if rods.bodies:
+            return self.by_table(rods)
         counts = rods.group_sizes
         return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
 
@@ -138,6 +140,7 @@ class GridModel(ImmersedModel):
     def warnings(self, scene: Scene) -> list[str]:
         """A net force that a back pressure carries, a flow that is not periodic, or not plane."""
         axis, out = self.case.fluid.thin_axis, grid_warnings.of_net_force(self.grid, scene, self.of_images)
+        out = [*out, *super().warnings(scene)]
         if axis is not None:
             return [*out, *grid_warnings.of_flow(self.grid, self.flow, axis), *sheet.of_flow(self.flow, axis, self.box)]
         return [*out, *grid_warnings.of_flow(self.grid, self.flow)]

@@ -24,6 +24,8 @@ class StokesModel(GridModel):
         """The exact table, or transforms, with the preconditioner that the method has."""
         from ...fluids import stokes
 
+        if rods.bodies:
+            return self.with_bodies(rods)
         if method == "table":
             return stokes.StokesByTable(immersed)
         solver = self.solver(rods, method)
@@ -59,8 +61,8 @@ class StokesModel(GridModel):
 
     @property
     def flow_from_forces(self) -> bool:  # type: ignore[override]
-        """Where no torque is on the grid: a run file has the forces alone."""
-        return not self.case.couples_torque
+        """Where no torque is on the grid, and no bodies push: a run file has the forces of nodes alone."""
+        return not self.case.couples_torque and not self.case.bodies
 
     def solve_for_flow(self) -> FlowOfForces:
         """One whole FFT there and back, planned in a hurry."""

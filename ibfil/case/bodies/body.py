@@ -52,6 +52,15 @@ class Body(Table):
     torque: TripleT | None = Field(None, description="external torque on it")
     frame: Literal["lab", "body"] = Field("lab", description="axes of force and torque: lab, or its own")
 
+    fit: Literal["translation", "rotation"] = Field(
+        "translation", description="on a grid: which drag its markers have, those of moving or of turning"
+    )
+
+    @property
+    def meets_rotation(self) -> bool:
+        """Whether its markers on a grid have its drag against turning, rather than against moving."""
+        return self.fit == "rotation"
+
     @property
     def given_motion(self) -> Motion | None:
         """The motion that is given; None where it is free."""

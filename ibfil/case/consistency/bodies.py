@@ -122,8 +122,7 @@ def _body(key: str, body: Body, ends: list[End]) -> Iterator[Fault]:
 def _scene(case: Scene) -> Iterator[Fault]:
     """Fluids, schemes and rods that bodies are not modelled with."""
     key = f"body.{next(iter(case.bodies))}"
-    if case.fluid.model != "rft":
-        yield Fault(key, f"a body in {shown(case.fluid.model)}", 'bodies with fluid.model = "rft"', ("fluid.model",))
+    yield from _fluid(case, key)
     if case.thermal is not None:
         yield Fault(key, "a body with [thermal]", "no bodies with [thermal]", ("thermal",))
     if case.time.scheme != "implicit":
@@ -139,3 +138,23 @@ def _scene(case: Scene) -> Iterator[Fault]:
             yield Fault(f"{own}.mass", "a mass in a scene with bodies, which have none", "no mass", ("body",))
         if filament.closed:
             yield Fault(f"{own}.closed", "true in a scene with bodies", "false", ("body",))
+
+
+def _fluid(case: Scene, key: str) -> Iterator[Fault]:
+    """Fluids, and ways to solve them, that bodies are not modelled with."""
+    fluid = case.fluid
+    if not fluid.on_grid:
+        return
+    if fluid.inertial:
+        found = f"a body with fluid.model = {shown(fluid.model)}"
+        yield Fault(key, found, '"stokes" or "rft" with bodies', ("fluid.model",))
+    elif fluid.wall is not None:
+        yield Fault("fluid.wall", f"{shown(fluid.wall)} in a scene with bodies", "no wall", ("fluid.wall", key))
+    if fluid.method not in ("auto", "table"):
+        yield Fault("fluid.method", f"{shown(fluid.method)} in a scene with bodies", '"table" or "auto"', (key,))
+    if fluid.single:
+        yield Fault("fluid.precision", f"{shown(fluid.precision)} in a scene with bodies", '"double"', (key,))
+    if fluid.thin_axis is not None:
+        yield Fault("fluid.cells", f"{shown(fluid.cells)}, a plane flow, with bodies", "a box in three dimensions", (key,))
+    if fluid.thick:
+        yield Fault("fluid.thick", "true in a scene with bodies on a grid", "false", (key,))

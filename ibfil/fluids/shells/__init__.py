@@ -1,0 +1,1 @@
+"""Bodies in a fluid that nodes push through a discrete delta kernel: shells of markers, which move rigidly."""

@@ -1,0 +1,85 @@
+"""Stokes flow about rods and bodies, by the exact mobility table of nodes and markers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base import Memoryless
+from ..coupling import Nodes
+from ..immersed_boundary import Immersed
+from ..spaces.base import Mobility, velocity_of
+from .response import Rigid, WithShells
+from .shell import Shells
+
+
+@dataclass(frozen=True)
+class ImmersedBodies(Immersed):
+    """The ingredients of a fluid about rods and ``shells``: those of rods have a row a node, and none a body."""
+
+    shells: Shells = Shells(0, (), 1.0)
+
+    @property
+    def own(self) -> np.ndarray:  # type: ignore[override]
+        """That of nodes (n + k, c), and none of markers."""
+        own = self.coupling.own(self.slip)
+        return np.concatenate([own, np.zeros((self.shells.count, own.shape[1]))])
+
+    @cached_property
+    def exact(self) -> Mobility:
+        """The exact mobility of nodes and markers."""
+        return self.mobility()
+
+    def all_nodes(self, r: np.ndarray, e3: np.ndarray) -> Nodes:
+        """Nodes and markers on the grid, from places and tangents (N, 3) of all rows."""
+        n, places = self.shells.nodes, self.shells.places(r, e3)
+        axes = np.concatenate([self.coupling.axes(e3[:n]), np.zeros_like(places)])
+        return Nodes(*self.stencil(np.concatenate([r[:n], places])), axes)
+
+    def rigid(self, nodes: Nodes, r: np.ndarray, e3: np.ndarray, time: float, p: int) -> Rigid:
+        """The mobility of ``nodes``, with markers taken out."""
+        matrix = self.exact.matrix(nodes, self.own)
+        drift = None if self.flow is None else self.flow(self.shells.places(r, e3), time).ravel()
+        c = self.coupling.components
+        return Rigid(matrix, c * self.shells.nodes, c, self.shells.levers(e3, p), drift)
+
+    def pushed(self, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float) -> tuple[Nodes, np.ndarray]:
+        """Nodes and markers, and what each does to the fluid (n + k, m).
+
+        ``force`` (N, m) has the bodies' force and torque; of markers that are rigid only these forces have them.
+        """
+        n, c, nodes = self.shells.nodes, self.coupling.components, self.all_nodes(r, e3)
+        whole = self.shells.of_rows(force)
+        rigid, felt = self.rigid(nodes, r, e3, time, len(whole)), force[:n, :c].ravel()
+        out = np.zeros((n + self.shells.count, force.shape[1]))
+        out[:n] = force[:n]
+        out[n:, :3] = rigid.pushes(rigid.rates(whole, felt), felt).reshape(-1, 3)
+        return nodes, out
+
+
+class StokesWithBodies(Memoryless):
+    """IB Stokes about rods and bodies, by the exact table."""
+
+    def __init__(self, immersed: ImmersedBodies) -> None:
+        self.immersed = immersed
+
+    def velocity_at(
+        self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
+    ) -> np.ndarray:
+        """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it, of nodes and bodies."""
+        immersed = self.immersed
+        nodes, pushed = immersed.pushed(r, e3, force, time)
+        c, places = immersed.coupling.components, immersed.stencil(points)
+        u = velocity_of(immersed.exact, immersed.coupling, places, nodes, pushed[:, :c])
+        return u if immersed.flow is None else u + immersed.flow(points, time)
+
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> WithShells:
+        """The mobility of rods and bodies at r, e3 (N, 3), in the background flow of ``time``."""
+        immersed, n = self.immersed, self.immersed.shells.nodes
+        nodes, p = immersed.all_nodes(r, e3), 3 * (immersed.shells.end - n) + len(r) - immersed.shells.end
+        rods = nodes[:n]
+        flow = immersed.advected(rods, r[:n], time)
+        rigid = immersed.rigid(nodes, r, e3, time, p)
+        return WithShells(immersed, rods, flow, rigid, immersed.shells, tau)
