@@ -1,0 +1,174 @@
+"""Shells of markers: their points, the radius that they have, and swimmers on a grid against a rigid mobility solve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ibfil.bodies.markers import area, markers
+from ibfil.bodies.resistance import ellipsoid
+from ibfil.bodies.rotation import rotation
+from ibfil.case.reading import parse_case
+from ibfil.errors import CaseError
+from ibfil.fluids.coupling import TRANSLATION, Nodes
+from ibfil.fluids.shells.calibration import fitted
+from ibfil.fluids.shells.shell import Shells
+from ibfil.fluids.spaces.free import FreeSpace
+from ibfil.fluids.spaces.periodic import PeriodicSpace
+from ibfil.grid.kernels import KERNELS
+from ibfil.simulation.simulation import Simulation
+
+SPACING = 1.75
+BOX = 'model = "stokes"\nbox = [2.4, 2.4, 2.4]\ncells = [48, 48, 48]'
+FREE = 'model = "stokes"\nbox = "free"\nspacing = 0.05'
+
+BACTERIUM = """
+[filament.tail]
+length = {length}
+nodes = {nodes}
+bending = 1e4
+twisting = 1e4
+stretching = 1e6
+radius = 0.02
+shape = {{ kind = "helix", radius = 0.1, pitch = 0.6 }}
+curvature = [{bend}, 0]
+twist_rate = {twist}
+position = [0.2, 0.1, 0]
+anchor = "start"
+normal = [0, 0, -1]
+start = {{ end = "body", body = "head", motor = {{ spin = 1.0, axis = [1, 0, 0] }} }}
+[body.head]
+shape = {{ kind = "sphere", radius = 0.2 }}
+position = [0, 0, 0]
+{more}
+[fluid]
+{fluid}
+kernel = "bspline4"
+viscosity = 1.3
+[time]
+end = 0.1
+step = 0.02
+[output]
+every = 0.1
+probes = [[0.5, 0.3, 0.1]]
+[observe.heat]
+kind = "dissipation"
+"""
+
+
+def bacterium(fluid: str, nodes: int = 25, more: str = "") -> Simulation:
+    r, c, turns = 0.1, 0.6 / (2 * np.pi), 1.5
+    length, q = float(2 * np.pi * turns * np.hypot(r, c)), r * r + c * c
+    known = {"length": length, "nodes": nodes, "bend": r / q, "twist": c / q, "more": more, "fluid": fluid}
+    return Simulation(parse_case(BACTERIUM.format(**known), "bacterium"))
+
+
+@pytest.mark.parametrize("axes", [(4.0, 4.0, 4.0), (6.0, 3.0, 3.0), (5.0, 4.0, 3.0)])
+def test_markers_lie_evenly_on_their_ellipsoid(axes):
+    size = np.array(axes)
+    points = markers(size, round(area(size) / SPACING**2))
+    np.testing.assert_allclose(np.linalg.norm(points / size, axis=1), 1.0, rtol=1e-12)
+    between = np.linalg.norm(points[:, None] - points, axis=2) + 9 * np.eye(len(points))
+    nearest = between.min(axis=1)
+    assert nearest.min() > 0.85 * SPACING  # of 1.07, were they all at the corners of even triangles
+    assert nearest.max() < 1.25 * SPACING
+    np.testing.assert_array_equal(points, markers(size, len(points)))
+
+
+def resistance(space, kernel: str, points: np.ndarray) -> np.ndarray:
+    """The 6 x 6 of a rigid shell of points (k, 3) about the origin of the body, at a place of its own in a cell."""
+    levers = Shells(0, (points,), 1.0).levers(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]), 6)
+    nodes = Nodes(*space.stencil(KERNELS[kernel], points + [0.23, 0.41, 0.07]), np.zeros_like(points))
+    mobility = space.mobility(TRANSLATION, KERNELS[kernel].points, 1.0).matrix(nodes, np.zeros_like(points))
+    return levers.T @ np.linalg.solve(mobility, levers)
+
+
+@pytest.mark.parametrize("kernel", ["peskin4", "bspline4"])
+def test_a_sphere_is_dragged_with_the_radius_that_is_asked_for(kernel):
+    """Stokes' 6 pi eta a in free space, at a place in the cell and an orientation that were not used to find it."""
+    a = 4.3
+    points = fitted((a, a, a), kernel, SPACING, False).markers @ rotation(np.array([0.4, -0.2, 0.9])).T
+    found = resistance(FreeSpace(1.0), kernel, points)
+    np.testing.assert_allclose(np.diag(found)[:3], 6 * np.pi * a, rtol=1.5e-3)
+    turning = fitted((a, a, a), kernel, SPACING, True).markers
+    np.testing.assert_allclose(np.diag(resistance(FreeSpace(1.0), kernel, turning))[3:], 8 * np.pi * a**3, rtol=3e-3)
+
+
+def test_a_sphere_in_a_box_is_slowed_by_its_images():
+    """Hasimoto's series at a/L = 0.1; its turning by 1 - (4 pi/3) x^3, with the radius of turning that it has."""
+    a, side = 3.2, 32
+    fit = fitted((a, a, a), "bspline4", SPACING, False)
+    space = PeriodicSpace((float(side),) * 3, (side,) * 3)
+    mobility = np.linalg.inv(resistance(space, "bspline4", fit.markers))
+    x = a / side
+    slowed = 1 - 2.837297 * x + 4.18879 * x**3 - 27.4 * x**6
+    np.testing.assert_allclose(np.diag(mobility)[:3] * 6 * np.pi * a, slowed, rtol=1.5e-3)
+    own = (8 * np.pi * np.diag(mobility)[3:] / (1 - 4 * np.pi / 3 * x**3)) ** (-1 / 3)
+    np.testing.assert_allclose(own, a * fit.rotation ** (-1 / 3), rtol=1e-3)
+
+
+def test_an_ellipsoid_has_its_mean_mobility():
+    """And each axis to a percent; turning about the long one is off by what the fit tells."""
+    axes = np.array([6.0, 4.0, 3.0])
+    fit = fitted((6.0, 4.0, 3.0), "bspline4", SPACING, False)
+    found, known = np.linalg.inv(resistance(FreeSpace(1.0), "bspline4", fit.markers)), ellipsoid(axes, 1.0)
+    ratio = np.diag(found)[:3] * known.translation
+    assert np.sum(np.diag(found)[:3]) == pytest.approx(np.sum(1 / known.translation), rel=1e-3)
+    np.testing.assert_allclose(ratio, 1.0, atol=0.01)
+    np.testing.assert_allclose(np.diag(found)[3:] * known.rotation, fit.rotation, rtol=5e-3)
+
+
+def rigid(sim: Simulation) -> tuple[np.ndarray, float, np.ndarray]:
+    """Velocity and rate (6,) of the swimmer that bends nowhere, its motor's torque, and all forces (c (n + k),).
+
+    M F = B V + b alpha, with the exact mobility of the run's own nodes and markers; force and torque of all F zero.
+    """
+    there, immersed = sim._there, sim.fluid.immersed
+    n, centre = sim.system.rows.n, there.r[sim.system.rows.n]
+    nodes = immersed.all_nodes(there.r, there.e3)
+    r = np.concatenate([there.r[:n], immersed.shells.places(there.r, there.e3)])
+    e3, axis = there.e3[:n], sim.system.rows.poses(there).axes[0][:, 0]
+    c = immersed.coupling.components
+    matrix = immersed.exact.matrix(nodes, immersed.own)
+    keep = np.ones((len(r), c), bool)
+    keep[n:, 3:] = False
+    keep = keep.ravel()
+    spins = np.zeros(n) if immersed.spin_drag is None else immersed.spin_drag
+
+    def motion(v, rate):
+        out = np.zeros((len(r), c))
+        turn = np.zeros((len(r), 3)) + v[3:]
+        turn[:n] += rate * axis
+        out[:, :3] = v[:3] + np.cross(turn, r - centre)
+        if c == 4:
+            out[:n, 3] = (e3 * turn[:n]).sum(axis=1)
+        return out, spins * (e3 * turn[:n]).sum(axis=1)
+
+    def wrench(v, rate):
+        moved, torque = motion(v, rate)
+        felt = np.zeros(len(r) * c)
+        felt[keep] = np.linalg.solve(matrix[np.ix_(keep, keep)], moved.ravel()[keep])
+        felt = felt.reshape(-1, c)
+        about = np.cross(r - centre, felt[:, :3])
+        about[:n] += (torque + (felt[:n, 3] if c == 4 else 0.0))[:, None] * e3
+        return np.concatenate([felt[:, :3].sum(axis=0), about.sum(axis=0)]), axis @ about[:n].sum(axis=0), felt
+
+    by_each = np.array([wrench(v, 0.0)[0] for v in np.eye(6)]).T
+    v = np.linalg.solve(by_each, -wrench(np.zeros(6), 1.0)[0])
+    return v, *wrench(v, 1.0)[1:]
+
+
+@pytest.mark.parametrize("fluid", [BOX, FREE, FREE + '\nrotation = "grid"'], ids=["box", "free", "torques"])
+def test_a_bacterium_moves_as_the_rigid_one(fluid):
+    """Its motor's torque, its velocity and counter-rotation; total force and torque zero; markers' forces, flow."""
+    sim = bacterium(fluid)
+    sim.advance(0.1, lambda: None)
+    now, (v, torque, felt) = sim.snapshot(), rigid(sim)
+    head, motor = now.bodies["head"], now.motors["tail_start"]
+    for found, known in ((head.velocity, v[:3]), (head.spin, v[3:])):
+        np.testing.assert_allclose(found, known, atol=1e-3 * np.linalg.norm(known))
+    assert motor.torque == pytest.approx(torque, rel=1e-3)
+    largest = max(np.abs(now.filaments["tail"].force).max(), np.abs(felt).max())
+    for total in (now.diagnostics["net_force"], now.diagnostics["net_torque"]):
+        assert np.abs(total).max() < 1e-12 * largest
+    np.testing.assert_allclose(head.force, felt[sim.system.rows.n :, :3].sum(axis=0), atol=2e-2 * largest)
