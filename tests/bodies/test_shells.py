@@ -55,6 +55,36 @@ probes = [[0.5, 0.3, 0.1]]
 kind = "dissipation"
 """
 
+SWIMMER = """
+[filament.tail]
+length = 0.8
+nodes = 13
+bending = 1.0
+twisting = 1.0
+stretching = 1e4
+radius = 0.02
+curvature = ["{bend}", 0]
+position = [0.2, 0, 0]
+anchor = "start"
+start = {{ end = "body", body = "head" }}
+[body.head]
+shape = {{ kind = "ellipsoid", axes = [0.2, 0.15, 0.15] }}
+position = [0, 0, 0]
+[fluid]
+{fluid}
+kernel = "bspline4"
+viscosity = 1.3
+[time]
+end = 1.0
+step = 0.02
+[output]
+every = 1.0
+"""
+
+
+def swimmer(fluid: str, bend: str = "0") -> Simulation:
+    return Simulation(parse_case(SWIMMER.format(fluid=fluid, bend=bend), "swimmer"))
+
 
 def bacterium(fluid: str, nodes: int = 25, more: str = "") -> Simulation:
     r, c, turns = 0.1, 0.6 / (2 * np.pi), 1.5
@@ -172,3 +202,70 @@ def test_a_bacterium_moves_as_the_rigid_one(fluid):
     for total in (now.diagnostics["net_force"], now.diagnostics["net_torque"]):
         assert np.abs(total).max() < 1e-12 * largest
     np.testing.assert_allclose(head.force, felt[sim.system.rows.n :, :3].sum(axis=0), atol=2e-2 * largest)
+
+
+def test_power_becomes_heat_and_the_flow_is_that_of_all():
+    """Of nodes and markers, recovered from the body's force and torque; a probe on a marker moves with the body."""
+    for fluid in (BOX, FREE):
+        sim = bacterium(fluid + '\nrotation = "grid"')
+        sim.advance(0.04, lambda: None)
+        step = sim.attempt(0.02)
+        there, shells, rows = step.there, sim.fluid.immersed.shells, sim.system.rows
+        found = sim.model.fluid_model.output(sim.rods, sim.fluid)
+        heat = found.dissipation(there, step.velocity, step.force, 0.06)
+        power = float(np.sum(step.velocity * step.force))
+        assert heat["dissipation"] + heat["slip_power"] == pytest.approx(power, rel=1e-9)
+        assert heat["grid_power"] == pytest.approx(heat["dissipation"], rel=1e-9)
+        marks = shells.places(there.r, there.e3)[::7]
+        u = sim.fluid.velocity_at(marks, there.r, there.e3, step.force, 0.06)
+        turn = step.velocity[shells.nodes + 1, :3] / rows.length
+        known = step.velocity[shells.nodes, :3] + np.cross(turn, marks - there.r[shells.nodes])
+        np.testing.assert_allclose(u, known, atol=1e-11)
+
+
+@pytest.mark.parametrize("rotation", ["local", "grid"])
+def test_a_flow_that_turns_and_moves_carries_a_swimmer_along(rotation):
+    """Rigid, and nothing pushes the fluid: its place by the turn about the flow's axis."""
+    sim = swimmer(FREE + f'\nrotation = "{rotation}"\nflow = ["0.2 - 0.5*y", "0.5*x", "0"]')
+    sim.advance(0.2, lambda: None)
+    head = sim.snapshot().bodies["head"]
+    known = [0.4 * np.sin(0.1), 0.4 - 0.4 * np.cos(0.1), 0.0]  # about (0, 0.4)
+    np.testing.assert_allclose(head.position, known, atol=4e-5)  # the first step asks the flow where it begins: dt^2/2 of 0.1
+    np.testing.assert_allclose(head.e1, [np.cos(0.1), np.sin(0.1), 0.0], atol=4e-5)
+    np.testing.assert_allclose(head.spin, [0.0, 0.0, 0.5], atol=2e-4)
+    assert np.abs(sim.snapshot().filaments["tail"].force).max() < 2e-3
+
+
+def test_steps_are_of_second_order():
+    """Where the head is and points after a beat that begins from rest, as steps are halved."""
+    ends = []
+    for count in (8, 16, 32):
+        sim = swimmer(FREE, "4*(1 - cos(3*t))*s")
+        for _ in range(count):
+            sim.accept(sim.attempt(1.0 / count), sim.time + 1.0 / count)
+        head = sim.snapshot().bodies["head"]
+        ends.append(np.concatenate([head.position, head.e1]))
+    ratio = np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(ends[1] - ends[2])
+    assert 3.3 < ratio < 4.7
+
+
+FAULTS = {
+    'fluid.method: found "fft" in a scene with bodies; allowed: "table" or "auto"': {"fluid": BOX + '\nmethod = "fft"'},
+    'fluid.precision: found "single" in a scene with bodies; allowed: "double"': {"fluid": FREE + '\nprecision = "single"'},
+    'fluid.wall: found "no-slip" in a scene with bodies; allowed: no wall': {"fluid": FREE + '\nwall = "no-slip"'},
+    "found a semi-axis of 2 cells, within which markers would lie at": {"fluid": FREE.replace("0.05", "0.1")},
+}
+
+
+@pytest.mark.parametrize("fault", list(FAULTS))
+def test_what_is_not_there_is_refused(fault):
+    with pytest.raises(CaseError) as caught:
+        bacterium(**({"fluid": FREE} | FAULTS[fault]))
+    assert fault in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_bodies_in_each_other_are_refused():
+    more = '[body.other]\nshape = { kind = "sphere", radius = 0.2 }\nposition = [0.1, 0, 0]'
+    with pytest.raises(CaseError, match=r"body.other: found markers .* cells from those of head; allowed: 0.4 cells"):
+        bacterium(FREE, more=more)
