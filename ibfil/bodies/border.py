@@ -18,7 +18,7 @@ from ..linalg.constraints import Carried, Clamps, Prescribed
 
 
 class Done(NamedTuple):
-    """What nodes do: their moves and what the fluid feels of them, (n, m), or (p, n, m) a unit of each unknown."""
+    """The part of nodes: their moves, and the force that the fluid feels of them, (n, m), or (p, n, m) a unit of each unknown."""
 
     moves: np.ndarray
     felt: np.ndarray
@@ -32,7 +32,7 @@ class Supported(NamedTuple):
 
 
 class Own(NamedTuple):
-    """What bodies themselves do to the fluid (p,), and how that follows each unknown (p, p)."""
+    """The part of bodies: their own forces on the fluid (p,), and how these follow each unknown (p, p)."""
 
     force: np.ndarray
     by_each: np.ndarray
@@ -75,7 +75,7 @@ def bordered(
 
 
 def _outside(carried: Carried, first: Done, each: Done) -> tuple[np.ndarray, np.ndarray]:
-    """What is felt less the loads from outside: (n, m), and (p, n, m) a unit of each unknown."""
+    """The felt forces less the loads from outside: (n, m), and (p, n, m) a unit of each unknown."""
     loaded, by_each = carried.external, each.felt - carried.external_columns.transpose(2, 0, 1)
     if carried.external_change is not None:
         loaded = loaded + carried.external_change(first.moves)

@@ -67,7 +67,7 @@ class FieldSource(Protocol):
 
 
 class Pushing(NamedTuple):
-    """The nodes that push, those of bodies among them: what each does (n, m), and the vectors that it puts on a grid."""
+    """The nodes that push, those of bodies among them, the force of each (n, m), and the vectors put onto the grid."""
 
     nodes: Nodes
     force: np.ndarray

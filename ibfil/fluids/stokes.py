@@ -93,16 +93,20 @@ class DenseResponse(ImmersedResponse):
         self._factors: tuple[Stiffness, gmres.Factors] | None = None  # and the stiffness they are of
 
     def apply(self, force: np.ndarray) -> np.ndarray:
+        """By the matrix."""
         return self.matrix @ force
 
     def columns(self, index: np.ndarray) -> np.ndarray:
+        """Of the matrix."""
         return self.matrix[:, index]
 
     @cached_property
     def root(self) -> DenseRoot:
+        """Its Cholesky factor."""
         return DenseRoot(self.matrix)
 
     def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+        """By LU factors, those of before where the stiffness is the same."""
         rods = statement.frozen()
         if self._factors is None or self._factors[0] is not rods.stiffness:
             system = rods.system((slice(0, len(self.nodes.axes)),), self.matrix, self.tau)

@@ -19,6 +19,7 @@ from ibfil.grid.kernels import KERNELS
 from ibfil.simulation.simulation import Simulation
 
 SPACING = 1.75
+PLACE = np.array([0.23, 0.41, 0.07])  # in a cell: none of those by which shells are fitted
 BOX = 'model = "stokes"\nbox = [2.4, 2.4, 2.4]\ncells = [48, 48, 48]'
 FREE = 'model = "stokes"\nbox = "free"\nspacing = 0.05'
 
@@ -108,7 +109,7 @@ def test_markers_lie_evenly_on_their_ellipsoid(axes):
 def resistance(space, kernel: str, points: np.ndarray) -> np.ndarray:
     """The 6 x 6 of a rigid shell of points (k, 3) about the origin of the body, at a place of its own in a cell."""
     levers = Shells(0, (points,), 1.0).levers(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]), 6)
-    nodes = Nodes(*space.stencil(KERNELS[kernel], points + [0.23, 0.41, 0.07]), np.zeros_like(points))
+    nodes = Nodes(*space.stencil(KERNELS[kernel], points + PLACE), np.zeros_like(points))
     mobility = space.mobility(TRANSLATION, KERNELS[kernel].points, 1.0).matrix(nodes, np.zeros_like(points))
     return levers.T @ np.linalg.solve(mobility, levers)
 
@@ -230,7 +231,9 @@ def test_a_flow_that_turns_and_moves_carries_a_swimmer_along(rotation):
     sim.advance(0.2, lambda: None)
     head = sim.snapshot().bodies["head"]
     known = [0.4 * np.sin(0.1), 0.4 - 0.4 * np.cos(0.1), 0.0]  # about (0, 0.4)
-    np.testing.assert_allclose(head.position, known, atol=4e-5)  # the first step asks the flow where it begins: dt^2/2 of 0.1
+    np.testing.assert_allclose(
+        head.position, known, atol=4e-5
+    )  # the first step asks the flow where it begins: dt^2/2 of 0.1
     np.testing.assert_allclose(head.e1, [np.cos(0.1), np.sin(0.1), 0.0], atol=4e-5)
     np.testing.assert_allclose(head.spin, [0.0, 0.0, 0.5], atol=2e-4)
     assert np.abs(sim.snapshot().filaments["tail"].force).max() < 2e-3
@@ -251,7 +254,9 @@ def test_steps_are_of_second_order():
 
 FAULTS = {
     'fluid.method: found "fft" in a scene with bodies; allowed: "table" or "auto"': {"fluid": BOX + '\nmethod = "fft"'},
-    'fluid.precision: found "single" in a scene with bodies; allowed: "double"': {"fluid": FREE + '\nprecision = "single"'},
+    'fluid.precision: found "single" in a scene with bodies; allowed: "double"': {
+        "fluid": FREE + '\nprecision = "single"'
+    },
     'fluid.wall: found "no-slip" in a scene with bodies; allowed: no wall': {"fluid": FREE + '\nwall = "no-slip"'},
     "found a semi-axis of 2 cells, within which markers would lie at": {"fluid": FREE.replace("0.05", "0.1")},
 }

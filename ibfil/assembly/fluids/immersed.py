@@ -91,7 +91,7 @@ class ImmersedModel(FluidModel):
             return immersed_boundary.Immersed(*parts)
         from ...fluids.shells.stokes import ImmersedBodies
 
-        return ImmersedBodies(*parts, shells.shells(case, rods, case.fluid.kernel, space.spacing))
+        return ImmersedBodies(*parts, shells=shells.shells(case, rods, case.fluid.kernel, space.spacing))
 
     def with_bodies(self, rods: RodStack) -> Fluid:
         """The fluid about rods and bodies, by the exact table."""
@@ -102,8 +102,13 @@ class ImmersedModel(FluidModel):
         return StokesWithBodies(immersed)
 
     def ingredients(self, rods: RodStack, fluid: Fluid) -> Immersed:
-        """Those that a fluid was made of, where it has tables of bodies; made again where it has none."""
-        return getattr(fluid, "immersed", None) if rods.bodies else self.immersed(rods)
+        """The ingredients of a fluid: with bodies those that it has, whose tables serve; else made anew."""
+        if not rods.bodies:
+            return self.immersed(rods)
+        from ...fluids.shells.stokes import StokesWithBodies
+
+        assert isinstance(fluid, StokesWithBodies)
+        return fluid.immersed
 
     def markers(self) -> int:
         """How many markers the bodies have."""

@@ -92,7 +92,7 @@ def _in_the_way(case: Case, rods: RodStack, placed: list[np.ndarray], h: float) 
 
 
 def told(case: Case, kernel: str, h: float) -> list[str]:
-    """What the shells of bodies are, and how well they stand for the bodies."""
+    """Lines on the shells of bodies: how many markers, and how well they stand for the bodies."""
     out = []
     for name, body in case.bodies.items():
         found = fit(case, name, kernel, h)

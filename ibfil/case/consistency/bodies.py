@@ -155,6 +155,8 @@ def _fluid(case: Scene, key: str) -> Iterator[Fault]:
     if fluid.single:
         yield Fault("fluid.precision", f"{shown(fluid.precision)} in a scene with bodies", '"double"', (key,))
     if fluid.thin_axis is not None:
-        yield Fault("fluid.cells", f"{shown(fluid.cells)}, a plane flow, with bodies", "a box in three dimensions", (key,))
+        yield Fault(
+            "fluid.cells", f"{shown(fluid.cells)}, a plane flow, with bodies", "a box in three dimensions", (key,)
+        )
     if fluid.thick:
         yield Fault("fluid.thick", "true in a scene with bodies on a grid", "false", (key,))

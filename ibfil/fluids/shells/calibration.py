@@ -77,7 +77,8 @@ def _fitted(axes: tuple[float, ...], kernel: str, spacing: float, turning: bool)
     offset = _root(off, begin)
     ratio = found[offset] * target
     scatter = float(np.ptp(ratio[:, 0].mean(axis=1)))
-    return Fit(points * (wanted - offset), offset, *ratio.mean(axis=0), scatter)
+    moved, turned = ratio.mean(axis=0)
+    return Fit(points * (wanted - offset), offset, moved, turned, scatter)
 
 
 def _refuse(inner: np.ndarray) -> None:

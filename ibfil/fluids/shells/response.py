@@ -36,7 +36,7 @@ class MarkersTooClose(StepFailed):
 
 
 class Rigid:
-    """The mobility of n nodes of rods and k markers, the markers taken out; c numbers of a node go through the fluid."""
+    """The mobility of n nodes and k markers, these taken out; c numbers of a node go through the fluid."""
 
     def __init__(
         self, matrix: np.ndarray, rods: int, components: int, levers: np.ndarray, drift: np.ndarray | None
@@ -50,7 +50,7 @@ class Rigid:
         try:
             self._factors = cho_factor(matrix[np.ix_(at, at)], lower=True, check_finite=False)
         except np.linalg.LinAlgError:
-            raise MarkersTooClose("markers of bodies are too close to each other: their mobility has no inverse", 0) from None
+            raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0) from None
         half = solve_triangular(self._factors[0], matrix[at, :rods], lower=True)
         self.rods = matrix[:rods, :rods] - half.T @ half
         self._through = solve_triangular(self._factors[0], half, lower=True, trans=1)  # T
@@ -61,7 +61,7 @@ class Rigid:
         self.resistance = levers.T @ self._own[:, :-1]  # of the bodies where rods do not push (p, p)
 
     def pushes(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
-        """What markers do to the fluid (3 k,) when q has rates (p,) and rods push with ``felt`` (c n,)."""
+        """The forces of markers on the fluid (3 k,) when q has rates (p,) and rods push with ``felt`` (c n,)."""
         return self._own[:, :-1] @ rate - self._own[:, -1] - self._through @ felt
 
     def forces(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
@@ -128,8 +128,10 @@ class WithShells:
         out[:, :c] += self.tau * self._rigid.carried.reshape(-1, c)
         return out
 
-    def _by(self, k: int, stiffness: Stiffness, carried: Carried, still: np.ndarray, shape: tuple[int, int]) -> Solution:
-        """What rods do where the k-th unknown of the bodies moves by one, and nothing else pushes."""
+    def _by(
+        self, k: int, stiffness: Stiffness, carried: Carried, still: np.ndarray, shape: tuple[int, int]
+    ) -> Solution:
+        """The rods' part where the k-th unknown of the bodies moves by one, and nothing else pushes."""
         zero = np.zeros(shape)
         follow = Prescribed(
             np.concatenate([still, carried.at]), np.concatenate([np.zeros(len(still)), carried.lever[:, k]])
@@ -142,7 +144,7 @@ class WithShells:
         self, held: Prescribed, first: Solution, each: list[Solution], y: np.ndarray, moved: np.ndarray
     ) -> Solution:
         """The correction of rods and bodies, from that of rods while bodies stay and by each unknown of these."""
-        n, c, rigid, tau = self._shells.nodes, self._c, self._rigid, self.tau
+        c, rigid, tau = self._c, self._rigid, self.tau
         moves, felt, reaction = (np.array(column) for column in zip(*each, strict=True))
         by_felt = felt[:, :, :c].reshape(len(each), -1)
         own = Own(
@@ -164,7 +166,7 @@ class WithShells:
 
 
 def _inside(held: Prescribed, carried: Carried, y: np.ndarray, n: int) -> tuple[Prescribed, np.ndarray]:
-    """What is held or carried among n nodes, at its place while bodies stay; and which is held but not carried."""
+    """The held and the carried among n nodes, at its place while bodies stay; and which is held but not carried."""
     inside = held.at < n * y.shape[1]
     still = held.at[inside]
     value = np.concatenate([held.value[inside], y.ravel()[carried.at] + carried.value])

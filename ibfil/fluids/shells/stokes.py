@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -19,10 +19,10 @@ from .shell import Shells
 class ImmersedBodies(Immersed):
     """The ingredients of a fluid about rods and ``shells``: those of rods have a row a node, and none a body."""
 
-    shells: Shells = Shells(0, (), 1.0)
+    shells: Shells = field(kw_only=True)
 
     @property
-    def own(self) -> np.ndarray:  # type: ignore[override]
+    def own(self) -> np.ndarray:
         """That of nodes (n + k, c), and none of markers."""
         own = self.coupling.own(self.slip)
         return np.concatenate([own, np.zeros((self.shells.count, own.shape[1]))])
