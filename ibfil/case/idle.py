@@ -25,6 +25,7 @@ def idle_keys(case: Case) -> list[str]:
         idle |= {f"body.{name}": ["fit"] for name in case.bodies}
         idle["output"] += ["grid_every", "fields", "grid_stride", "window", "window_at", "probes"]
     else:
+        idle |= {f"body.{name}": ["resistance"] for name in case.bodies}
         turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())
         spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None
         idle["fluid"] += [] if turns and spin else ["drag"]
