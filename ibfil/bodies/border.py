@@ -18,7 +18,7 @@ from ..linalg.constraints import Carried, Clamps, Prescribed
 
 
 class Done(NamedTuple):
-    """The part of nodes: their moves, and the force that the fluid feels of them, (n, m), or (p, n, m) a unit of each unknown."""
+    """The part of nodes: moves, and forces that the fluid feels, (n, m), or (p, n, m) a unit of each unknown."""
 
     moves: np.ndarray
     felt: np.ndarray
