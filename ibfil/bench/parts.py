@@ -11,6 +11,7 @@ from . import linked as bench_linked
 from . import many as bench_many
 from . import pieces
 from . import spaces as bench_spaces
+from . import swimming as bench_swimming
 from . import thermal as bench_thermal
 from . import threads as bench_threads
 from .timing import Row, table
@@ -62,6 +63,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "swimmer": lambda: pieces.swimmers(),
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],
     "links": lambda: [*bench_linked.linked(6, (280.0, None)), *bench_linked.linked(2, (165.0, None))],
+    "body": lambda: bench_swimming.heads(),
     "threads": threads,
     "many": lambda: many(),
 }
