@@ -10,24 +10,22 @@ and so, with T = M_mm^-1 M_mr, the rods feel a fluid in which the bodies are, an
     F_m = M_mm^-1 (B (q - target)/tau - u0_m) - T F_r
     y_r = target + tau (u0_r - T^T u0_m) + T^T B (q - target) + tau (M_rr - M_rm T) F_r
 
-The rods' system is factored once and has one right side more for each unknown of q; the balance of q is in
+The rods' system is dense, factored once, and has one right side more for each unknown of q; the balance of q is in
 bodies/border.py, with own = B^T F_m. M_mm is positive definite, and taken out once a step.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
 from ...bodies.border import Done, Own, bordered, frozen, supported
 from ...errors import StepFailed
 from ...linalg.constraints import Carried, Prescribed
+from ...linalg.gmres import Factors, factor
 from ...linalg.normal_numbers import Draw
 from ...linalg.stiffness import Stiffness, no_pairs
 from ..base import Solution
-from ..coupling import Nodes
-from ..immersed_boundary import Immersed
-from ..stokes import DenseResponse
 from .shell import Shells
 
 
@@ -45,28 +43,39 @@ class Rigid:
 
         ``levers`` (3 k, p) and ``drift`` (3 k,), in a background flow, are of the markers.
         """
-        self.whole, self.levers = matrix, levers
-        at = np.arange(rods, len(matrix)).reshape(-1, components)[:, :3].ravel()  # markers do not spin
+        self.whole = matrix
+        at: slice | np.ndarray = slice(rods, None)
+        if components > 3:  # markers do not spin
+            at = np.arange(rods, len(matrix)).reshape(-1, components)[:, :3].ravel()
+        shell, across = matrix[at][:, at], matrix[at, :rods]
         try:
-            self._factors = cho_factor(matrix[np.ix_(at, at)], lower=True, check_finite=False)
+            self._lower = cholesky(shell, lower=True, check_finite=False)
         except np.linalg.LinAlgError:
             raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0) from None
-        half = solve_triangular(self._factors[0], matrix[at, :rods], lower=True)
-        self.rods = matrix[:rods, :rods] - half.T @ half
-        self._through = solve_triangular(self._factors[0], half, lower=True, trans=1)  # T
-        self.by_bodies = self._through.T @ levers  # how rods move with q
-        self._drift = np.zeros(len(levers)) if drift is None else drift
-        self.carried = -(self._through.T @ self._drift)
-        self._own = cho_solve(self._factors, np.column_stack([levers, self._drift]))
-        self.resistance = levers.T @ self._own[:, :-1]  # of the bodies where rods do not push (p, p)
+        drifting = np.zeros((len(levers), 1)) if drift is None else drift[:, None]
+        half = self._solved(np.concatenate([across, levers, drifting], axis=1))
+        self._half, own, drifted = half[:, :rods], half[:, rods:-1], half[:, -1]
+        self._own = half[:, rods:]
+        self.rods = matrix[:rods, :rods] - self._half.T @ self._half
+        self.by_bodies = self._half.T @ own  # how rods move with q: T^T B
+        self.carried = -(self._half.T @ drifted)
+        self.resistance = own.T @ own  # of the bodies where rods do not push (p, p)
+        self._drifting = own.T @ drifted
+
+    def _solved(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """L^-1 right, or L^-T, of M_mm = L L^T."""
+        out: np.ndarray = solve_triangular(
+            self._lower, right, trans=int(transposed), lower=True, overwrite_b=True, check_finite=False
+        )
+        return out
 
     def pushes(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
         """The forces of markers on the fluid (3 k,) when q has rates (p,) and rods push with ``felt`` (c n,)."""
-        return self._own[:, :-1] @ rate - self._own[:, -1] - self._through @ felt
+        return self._solved(self._own @ np.append(rate, -1.0) - self._half @ felt, transposed=True)
 
     def forces(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
         """B^T F_m: forces and torques of the bodies on the fluid (p,)."""
-        out: np.ndarray = self.levers.T @ self.pushes(rate, felt)
+        out: np.ndarray = self.resistance @ rate - self._drifting - self.by_bodies.T @ felt
         return out
 
     def rates(self, force: np.ndarray, felt: np.ndarray) -> np.ndarray:
@@ -77,17 +86,21 @@ class Rigid:
 
 
 class WithShells:
-    """The response of rods and bodies, positions frozen over a step of effective length tau."""
+    """The response of rods and bodies, positions frozen over a step of effective length tau.
+
+    Dense: all m unknowns of a node in one system, turns that do not go through the fluid by their own drag (n,).
+    """
 
     keeps = True
 
     def __init__(
-        self, immersed: Immersed, nodes: Nodes, flow: np.ndarray | None, rigid: Rigid, shells: Shells, tau: float
+        self, rigid: Rigid, shells: Shells, flow: np.ndarray | None, spin_drag: np.ndarray | None, tau: float
     ) -> None:
-        """``nodes`` of rods alone and the motions ``flow`` (n, c) or (n, m) of these without any force."""
+        """``flow`` (n, c) or (n, m): the motions of nodes without any force."""
         self._rigid, self._shells, self._flow, self.tau = rigid, shells, flow, tau
-        self._rods = DenseResponse(immersed, nodes, None, tau, rigid.rods)
-        self._c = immersed.coupling.components
+        self._c = len(rigid.rods) // shells.nodes
+        self._mobility = rigid.rods if spin_drag is None else _with_turns(rigid.rods, spin_drag)
+        self._factors: tuple[Stiffness, Factors] | None = None  # and the stiffness they are of
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """Not of scenes with bodies, which have no thermal forces."""
@@ -96,78 +109,96 @@ class WithShells:
     def implicit(
         self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
     ) -> Solution:
-        """One correction of nodes and bodies."""
+        """One correction of nodes and bodies: of nodes while bodies stay, and by each unknown of these, in one."""
         carried = held.carried
         assert carried is not None
-        n, shells = self._shells.nodes, self._shells
-        moved = shells.of_rows(y - target)
-        fixed, still = _inside(held, carried, y, n)
-        first = self._rods.implicit(force[:n], stiffness, fixed, y[:n], self._base(target[:n], moved))
-        each = [self._by(k, stiffness, carried, still, force[:n].shape) for k in range(len(carried.by))]
-        return self._whole(held, first, each, y, moved)
+        n, m = self._shells.nodes, force.shape[1]
+        moved = self._shells.of_rows(y - target)
+        at, value = _inside(held, carried, y, n * m)
+        known = np.zeros((1 + len(carried.by), n * m))
+        known[:, at] = value
+        pushes = np.concatenate([force[None, :n], carried.columns.transpose(2, 0, 1)]).reshape(len(known), -1)
+        base = np.concatenate([(self._base(target[:n], moved) - y[:n])[None], self._by_bodies(m)]).reshape(known.shape)
+        pushed = pushes + _times(stiffness, known, m)
+        x = self._solve(stiffness, at, (base - known + self.tau * pushed @ self._mobility).T).T
+        d, reaction = x.copy(), np.zeros_like(x)
+        d[:, at], reaction[:, at] = value, x[:, at]
+        felt = pushes + _times(stiffness, d, m) + reaction
+        parts = (part.reshape(-1, n, m) for part in (d, felt, reaction))
+        return self._whole(held, carried, Solution(*parts), y, moved)
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements without stiffness: by that of none."""
         n, m = self._shells.nodes, force.shape[1]
         none = Stiffness(np.zeros((n, m, 3 * m)), no_pairs(m))
-        carried = held.carried
-        assert carried is not None
-        bare = frozen(carried)
-        return self.implicit(force, none, held._replace(carried=bare), np.zeros_like(force), target)
+        assert held.carried is not None
+        bare = held._replace(carried=frozen(held.carried))
+        return self.implicit(force, none, bare, np.zeros_like(force), target)
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """Velocities of forces on rods and markers, c numbers of each (flat), without the background flow."""
         return self._rigid.whole @ force
 
+    def _solve(self, stiffness: Stiffness, at: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """x of (1 - tau M K) x = right (m n, k), columns of -tau M where unknowns are held: there forces are sought."""
+        if self._factors is None or self._factors[0] is not stiffness:
+            size = len(self._mobility)
+            system = stiffness.transposed_product(self._mobility, -self.tau).reshape(size, size)
+            system.ravel()[:: size + 1] += 1.0
+            system[at] = -self.tau * self._mobility[at]
+            self._factors = stiffness, factor(system)
+        return self._factors[1].solve(right)
+
     def _base(self, target: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """The displacements (n, m) of rods without any force, bodies having moved by ``moved`` (p,)."""
         out, c = target.copy(), self._c
-        out[:, :c] += (self._rigid.by_bodies @ moved).reshape(-1, c)
+        out[:, :c] += (self._rigid.by_bodies @ moved + self.tau * self._rigid.carried).reshape(-1, c)
         if self._flow is not None:
             out[:, : self._flow.shape[1]] += self.tau * self._flow
-        out[:, :c] += self.tau * self._rigid.carried.reshape(-1, c)
         return out
 
-    def _by(
-        self, k: int, stiffness: Stiffness, carried: Carried, still: np.ndarray, shape: tuple[int, int]
-    ) -> Solution:
-        """The rods' part where the k-th unknown of the bodies moves by one, and nothing else pushes."""
-        zero = np.zeros(shape)
-        follow = Prescribed(
-            np.concatenate([still, carried.at]), np.concatenate([np.zeros(len(still)), carried.lever[:, k]])
-        )
-        base = zero.copy()
-        base[:, : self._c] = self._rigid.by_bodies[:, k].reshape(-1, self._c)
-        return self._rods.implicit(carried.columns[:, :, k], stiffness, follow, zero, base)
+    def _by_bodies(self, m: int) -> np.ndarray:
+        """The displacements (p, n, m) of rods as each unknown of the bodies moves by one."""
+        n, p = self._shells.nodes, self._rigid.by_bodies.shape[1]
+        out = np.zeros((p, n, m))
+        out[:, :, : self._c] = self._rigid.by_bodies.T.reshape(p, n, self._c)
+        return out
 
-    def _whole(
-        self, held: Prescribed, first: Solution, each: list[Solution], y: np.ndarray, moved: np.ndarray
-    ) -> Solution:
-        """The correction of rods and bodies, from that of rods while bodies stay and by each unknown of these."""
+    def _whole(self, held: Prescribed, carried: Carried, nodes: Solution, y: np.ndarray, moved: np.ndarray) -> Solution:
+        """The correction of rods and bodies, from that of rods while bodies stay and by each unknown (1 + p, n, m)."""
         c, rigid, tau = self._c, self._rigid, self.tau
-        moves, felt, reaction = (np.array(column) for column in zip(*each, strict=True))
-        by_felt = felt[:, :, :c].reshape(len(each), -1)
-        own = Own(
-            rigid.forces(moved / tau, first.force[:, :c].ravel()),
-            rigid.resistance / tau - rigid.by_bodies.T @ by_felt.T,
-        )
-        nodes, by_each, carried, supports = Done(first.move, first.force), Done(moves, felt), held.carried, None
-        assert carried is not None
+        felt = nodes.force[:, :, :c].reshape(len(nodes.force), -1)
+        own = Own(rigid.forces(moved / tau, felt[0]), rigid.resistance / tau - rigid.by_bodies.T @ felt[1:].T)
+        first, each, supports = Done(nodes.move[0], nodes.force[0]), Done(nodes.move[1:], nodes.force[1:]), None
         if carried.clamps is not None:
-            at = carried.clamps.nodes
-            supports = supported(carried.clamps, first.reaction[at], reaction[:, at], nodes, by_each)
-        dq, reacted = bordered(held, carried, (nodes, by_each, own, supports), y, moved / tau, tau)
-        d, force, support = (
-            one + np.tensordot(dq, some, 1) for one, some in zip(first, (moves, felt, reaction), strict=True)
-        )
+            there = nodes.reaction[:, carried.clamps.nodes]
+            supports = supported(carried.clamps, there[0], there[1:], first, each)
+        dq, reacted = bordered(held, carried, (first, each, own, supports), y, moved / tau, tau)
+        d, force, support = (np.tensordot(np.append(1.0, dq), part, 1) for part in nodes)
         done = rigid.forces((moved + dq) / tau, force[:, :c].ravel())
         rows = (self._shells.in_rows(q, y.shape) for q in (dq, done, reacted))
         return Solution(*(np.concatenate(both) for both in zip((d, force, support), rows, strict=True)))
 
 
-def _inside(held: Prescribed, carried: Carried, y: np.ndarray, n: int) -> tuple[Prescribed, np.ndarray]:
-    """The held and the carried among n nodes, at its place while bodies stay; and which is held but not carried."""
-    inside = held.at < n * y.shape[1]
-    still = held.at[inside]
-    value = np.concatenate([held.value[inside], y.ravel()[carried.at] + carried.value])
-    return Prescribed(np.concatenate([still, carried.at]), value), still
+def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The held and the carried among the first unknowns, and their moves (1 + p, k): now, by each of q."""
+    inside = held.at < count
+    still, flat = held.at[inside], y.ravel()
+    value = np.zeros((1 + len(carried.by), len(still) + len(carried.at)))
+    value[0] = np.concatenate([held.value[inside] - flat[still], carried.value])
+    value[1:, len(still) :] = carried.lever.T
+    return np.concatenate([still, carried.at]), value
+
+
+def _times(stiffness: Stiffness, x: np.ndarray, m: int) -> np.ndarray:
+    """K times each of x (k, m n)."""
+    return np.array([stiffness.times(one.reshape(-1, m)).ravel() for one in x])
+
+
+def _with_turns(mobility: np.ndarray, spin_drag: np.ndarray) -> np.ndarray:
+    """The mobility (4 n, 4 n) of forces and torques, from that of forces and the drag (n,) against turning."""
+    n = len(spin_drag)
+    out = np.zeros((n, 4, n, 4))
+    out[:, :3, :, :3] = mobility.reshape(n, 3, n, 3)
+    out[np.arange(n), 3, np.arange(n), 3] = 1.0 / spin_drag
+    return out.reshape(4 * n, 4 * n)

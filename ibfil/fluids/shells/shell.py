@@ -8,8 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ...rods.loads import cross_matrix
-
 
 @dataclass(frozen=True)
 class Shells:
@@ -42,7 +40,10 @@ class Shells:
         for b, arms in enumerate(self._arms(e3)):
             here = slice(first, first + len(arms))
             out[here, :, 6 * b : 6 * b + 3] = np.eye(3)
-            out[here, :, 6 * b + 3 : 6 * b + 6] = [-cross_matrix(arm) / self.length for arm in arms] or 0.0
+            x, y, z = arms.T / self.length
+            turns = out[here, :, 6 * b + 3 : 6 * b + 6]
+            turns[:, 0, 1], turns[:, 0, 2], turns[:, 1, 2] = z, -y, x
+            turns[:, 1, 0], turns[:, 2, 0], turns[:, 2, 1] = -z, y, -x
             first += len(arms)
         return out.reshape(3 * self.count, p)
 

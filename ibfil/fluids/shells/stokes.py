@@ -82,4 +82,4 @@ class StokesWithBodies(Memoryless):
         rods = nodes[:n]
         flow = immersed.advected(rods, r[:n], time)
         rigid = immersed.rigid(nodes, r, e3, time, p)
-        return WithShells(immersed, rods, flow, rigid, immersed.shells, tau)
+        return WithShells(rigid, immersed.shells, flow, immersed.spin_drag, tau)
