@@ -114,10 +114,10 @@ def without_box(case: Case, rods: Sequence[int], parts: int, whole: float, pair:
     return found
 
 
-def with_markers(case: Case, nodes: int, markers: int, parts: int) -> float:
+def with_markers(case: Case, nodes: int, markers: int, parts: int, pair: float = 1.0) -> float:
     """Seconds of one step by the table with markers of bodies, which are taken out of it once a step."""
     rods, shell = solved(nodes, parts), _root(markers, 3) + 6.0 * markers * 3 * (parts * nodes) ** 2 * _FLOP
-    return of_rods(case, nodes) + _table(nodes + markers, parts) + shell + _ROUNDS[case.time.scheme] * rods
+    return of_rods(case, nodes) + pair * _table(nodes + markers, parts) + shell + _ROUNDS[case.time.scheme] * rods
 
 
 def _table(nodes: int, parts: int) -> float:

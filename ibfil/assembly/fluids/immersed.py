@@ -93,13 +93,15 @@ class ImmersedModel(FluidModel):
 
         return ImmersedBodies(*parts, shells=shells.shells(case, rods, case.fluid.kernel, space.spacing))
 
+    lowest_marker = -np.inf  # the height below which markers of bodies may not come
+
     def with_bodies(self, rods: RodStack) -> Fluid:
         """The fluid about rods and bodies, by the exact table."""
         from ...fluids.shells.stokes import ImmersedBodies, StokesWithBodies
 
         immersed = self.immersed(rods)
         assert isinstance(immersed, ImmersedBodies)
-        return StokesWithBodies(immersed)
+        return StokesWithBodies(immersed, self.lowest_marker)
 
     def ingredients(self, rods: RodStack, fluid: Fluid) -> Immersed:
         """The ingredients of a fluid: with bodies those that it has, whose tables serve; else made anew."""
@@ -124,9 +126,12 @@ class ImmersedModel(FluidModel):
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
 
-    def by_table(self, rods: RodStack) -> dict[str, float]:
-        """Seconds of a step with bodies, from counts: the table of nodes and markers, whose system is that of nodes."""
-        return {"table": costs.with_markers(self.case, rods.count, self.markers(), self.components)}
+    def by_table(self, rods: RodStack, pair: float = 1.0) -> dict[str, float]:
+        """Seconds of a step with bodies, from counts: the table of nodes and markers, whose system is that of nodes.
+
+        ``pair`` is what a pair costs, over what it does in the periodic table.
+        """
+        return {"table": costs.with_markers(self.case, rods.count, self.markers(), self.components, pair)}
 
     def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""

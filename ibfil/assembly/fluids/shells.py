@@ -57,6 +57,19 @@ def shells(case: Case, rods: RodStack, kernel: str, h: float) -> Shells:
     return Shells(rods.count, tuple(own), rows.length)
 
 
+def refuse_below(case: Case, rods: RodStack, kernel: str, h: float, lowest: float) -> None:
+    """Raises CaseError for bodies whose markers are below a height at the start."""
+    start, faults = rods.start, []
+    own = shells(case, rods, kernel, h)
+    for name, cloud in zip(case.bodies, own.clouds(start.r, start.e3), strict=True):
+        height = float(np.min(cloud[:, 2], initial=np.inf))
+        if height < lowest:
+            found = f"found markers at z = {height:.3g}, in the wall or too near"
+            faults.append(f"{case.file}: body.{name}: {found}; allowed: {lowest:.3g} or more")
+    if faults:
+        raise CaseError(faults)
+
+
 def _turned(points: np.ndarray, body: Body, nodes: np.ndarray) -> np.ndarray:
     """Markers (k, 3) as far from nodes (n, 3) as turning them helps: those of a sphere may be."""
     if not len(points) or len(set(body.shape.semi_axes)) > 1:

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import CaseError, StepFailed
 from .. import costs
 from .. import grid as grids
-from . import wall_warnings
+from . import shells, wall_warnings
 from .free_space import FreeModel
 
 if TYPE_CHECKING:
@@ -46,7 +46,14 @@ class WallModel(FreeModel):
         faults = [*self._below(rods), *self._stuck(rods)]
         if faults:
             raise CaseError(faults)
+        if rods.bodies:
+            shells.refuse_below(self.case, rods, self.case.fluid.kernel, self.space.spacing, self.lowest_marker)
         return super().build(rods)
+
+    @property
+    def lowest_marker(self) -> float:  # type: ignore[override]
+        """Half a cell: nearer ones are hardly moved."""
+        return 0.5 * self.space.spacing
 
     def _below(self, rods: RodStack) -> list[str]:
         """A line for each filament that reaches below the wall."""
@@ -107,6 +114,8 @@ class WallModel(FreeModel):
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
+        if rods.bodies:
+            return self.by_table(rods, _IMAGES)
         counts = [where.stop - where.start for where in rods.nodes]
         return costs.without_box(self.case, counts, self.components, self.evaluation(rods), _IMAGES)
 

@@ -148,8 +148,6 @@ def _fluid(case: Scene, key: str) -> Iterator[Fault]:
     if fluid.inertial:
         found = f"a body with fluid.model = {shown(fluid.model)}"
         yield Fault(key, found, '"stokes" or "rft" with bodies', ("fluid.model",))
-    elif fluid.wall is not None:
-        yield Fault("fluid.wall", f"{shown(fluid.wall)} in a scene with bodies", "no wall", ("fluid.wall", key))
     if fluid.method not in ("auto", "table"):
         yield Fault("fluid.method", f"{shown(fluid.method)} in a scene with bodies", '"table" or "auto"', (key,))
     if fluid.single:

@@ -174,7 +174,8 @@ class WithShells:
             there = nodes.reaction[:, carried.clamps.nodes]
             supports = supported(carried.clamps, there[0], there[1:], first, each)
         dq, reacted = bordered(held, carried, (first, each, own, supports), y, moved / tau, tau)
-        d, force, support = (np.tensordot(np.append(1.0, dq), part, 1) for part in nodes)
+        weights = np.append(1.0, dq)
+        d, force, support = ((weights @ part.reshape(len(part), -1)).reshape(part.shape[1:]) for part in nodes)
         done = rigid.forces((moved + dq) / tau, force[:, :c].ravel())
         rows = (self._shells.in_rows(q, y.shape) for q in (dq, done, reacted))
         return Solution(*(np.concatenate(both) for both in zip((d, force, support), rows, strict=True)))

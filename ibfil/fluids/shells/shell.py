@@ -32,7 +32,11 @@ class Shells:
 
     def places(self, r: np.ndarray, e3: np.ndarray) -> np.ndarray:
         """Where the markers are (k, 3), from places and tangents (N, 3) of all rows."""
-        return np.concatenate([r[self.nodes : self.end : 2][b] + arms for b, arms in enumerate(self._arms(e3))])
+        return np.concatenate(self.clouds(r, e3))
+
+    def clouds(self, r: np.ndarray, e3: np.ndarray) -> list[np.ndarray]:
+        """The same, (k, 3) a body."""
+        return [r[self.nodes : self.end : 2][b] + arms for b, arms in enumerate(self._arms(e3))]
 
     def levers(self, e3: np.ndarray, p: int) -> np.ndarray:
         """How markers move (3 k, p) with the unknowns q: [1, -(x - X) x /length] for the body that they are of."""

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...errors import StepFailed
 from ..base import Memoryless
 from ..coupling import Nodes
 from ..immersed_boundary import Immersed
@@ -59,11 +60,16 @@ class ImmersedBodies(Immersed):
         return nodes, out
 
 
+class BodyInWall(StepFailed):
+    """A body's marker came too near to a wall."""
+
+
 class StokesWithBodies(Memoryless):
     """IB Stokes about rods and bodies, by the exact table."""
 
-    def __init__(self, immersed: ImmersedBodies) -> None:
-        self.immersed = immersed
+    def __init__(self, immersed: ImmersedBodies, lowest: float = -np.inf) -> None:
+        """``lowest``: the height below which markers may not come."""
+        self.immersed, self.lowest = immersed, lowest
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
@@ -78,6 +84,9 @@ class StokesWithBodies(Memoryless):
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> WithShells:
         """The mobility of rods and bodies at r, e3 (N, 3), in the background flow of ``time``."""
         immersed, n = self.immersed, self.immersed.shells.nodes
+        height = float(np.min(immersed.shells.places(r, e3)[:, 2], initial=np.inf))
+        if height < self.lowest:
+            raise BodyInWall(f"a body went into the wall: a marker at z = {height:.3g}, allowed {self.lowest:.3g}", 0)
         nodes, p = immersed.all_nodes(r, e3), 3 * (immersed.shells.end - n) + len(r) - immersed.shells.end
         rods = nodes[:n]
         flow = immersed.advected(rods, r[:n], time)
