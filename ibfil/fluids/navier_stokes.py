@@ -27,7 +27,7 @@ from .background_flow import FIELDS, Background
 from .base import Response
 from .coupling import Nodes
 from .history import History, Weights, weights
-from .immersed_boundary import Immersed, ImmersedResponse
+from .immersed_boundary import Immersed
 from .stokes import Tabulated
 
 SAME = 1e-9  # steps that differ by less, as the differences of rounded times do, share their operator
@@ -73,10 +73,11 @@ class Workspace:
         return self._slab.gather(nodes.stencil, modes)
 
 
-class _Asked(NamedTuple):
-    """The response given last, and how its step looks back."""
+class Asked(NamedTuple):
+    """The response given last, the nodes that push in it, and how its step looks back."""
 
-    response: ImmersedResponse
+    response: Response
+    nodes: Nodes
     weights: Weights
 
 
@@ -99,7 +100,7 @@ class NavierStokes:
         self.history = History(self.grid, density, immersed.viscosity, immersed.number)
         self._make, self.workspace, self._background = operator, workspace, background
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
-        self._asked: _Asked | None = None
+        self._asked: Asked | None = None
         self.time = 0.0
         self.fastest = 0.0 if background is None else float(np.abs(background.at(0.0)[:3]).max())
 
@@ -111,7 +112,7 @@ class NavierStokes:
         self._operators = [found, *(pair for pair in kept if pair is not found)][:KEPT]
         return found
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> ImmersedResponse:
+    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> Response:
         """The mobility over a step of effective length tau, and the velocity with which the fluid coasts into it."""
         alpha, operator = self._operator(self.density / tau)
         nodes, past = self.immersed.nodes(r, e3), weights(alpha, tau, w, self.history.dt_old)
@@ -120,14 +121,14 @@ class NavierStokes:
         if flow is not None:
             u0 = np.column_stack([u0 + flow[:, : u0.shape[1]], flow[:, u0.shape[1] :]])
         response = operator.respond(nodes, u0, tau)
-        self._asked = _Asked(response, past)
+        self._asked = Asked(response, nodes, past)
         return response
 
     def advance(self, response: Response, velocity: np.ndarray, force: np.ndarray) -> None:
         """The velocity at the end of the step, and its advection. Raises ValueError for a step not asked for last."""
         if self._asked is None or response is not self._asked.response:
             raise ValueError("a step that is taken must be the one the fluid was asked for last")
-        nodes, past = self._asked.response.nodes, self._asked.weights
+        nodes, past = self._asked.nodes, self._asked.weights
         for block in self.workspace.scatter(nodes, self.immersed.coupling.to_grid(nodes.axes, force)):
             self.history.apply_forces(past, block, self.workspace.flow.modes)
         self.time += past.dt

@@ -107,10 +107,11 @@ class ImmersedModel(FluidModel):
         """The ingredients of a fluid: with bodies those that it has, whose tables serve; else made anew."""
         if not rods.bodies:
             return self.immersed(rods)
+        from ...fluids.shells.navier_stokes import NavierStokesWithBodies
         from ...fluids.shells.stokes import StokesWithBodies
 
-        assert isinstance(fluid, StokesWithBodies)
-        return fluid.immersed
+        assert isinstance(fluid, StokesWithBodies | NavierStokesWithBodies)
+        return fluid.pushing
 
     def markers(self) -> int:
         """How many markers the bodies have."""
@@ -126,12 +127,13 @@ class ImmersedModel(FluidModel):
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
 
-    def by_table(self, rods: RodStack, pair: float = 1.0) -> dict[str, float]:
+    def by_table(self, rods: RodStack, pair: float = 1.0, inertia: float = 0.0) -> dict[str, float]:
         """Seconds of a step with bodies, from counts: the table of nodes and markers, whose system is that of nodes.
 
-        ``pair`` is what a pair costs, over what it does in the periodic table.
+        ``pair`` is what a pair costs, over what it does in the periodic table, ``inertia`` what a fluid's own takes.
         """
-        return {"table": costs.with_markers(self.case, rods.count, self.markers(), self.components, pair)}
+        more = inertia if self.case.fluid.inertial else 0.0
+        return {"table": more + costs.with_markers(self.case, rods.count, self.markers(), self.components, pair)}
 
     def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""

@@ -78,7 +78,13 @@ class NavierStokesModel(GridModel):
         background = None
         if immersed.flow is not None:
             background = Background(self.grid, immersed.flow, flow_parts(self.case), threads)
-        return NavierStokes(immersed, self.density, operator, workspace, background)
+        if not rods.bodies:
+            return NavierStokes(immersed, self.density, operator, workspace, background)
+        from ...fluids.shells.navier_stokes import NavierStokesWithBodies
+        from ...fluids.shells.stokes import ImmersedBodies
+
+        assert isinstance(immersed, ImmersedBodies)
+        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background)
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """Of the velocity that the fluid has."""
@@ -87,7 +93,7 @@ class NavierStokesModel(GridModel):
         from ...fluids.output import GridOutput
 
         assert isinstance(fluid, NavierStokes)
-        return GridOutput(self.immersed(rods), InertialFields(fluid, self.flow, self.case.compute.threads))
+        return GridOutput(self.ingredients(rods, fluid), InertialFields(fluid, self.flow, self.case.compute.threads))
 
     def transforms(self, rods: RodStack) -> bool:
         """Always: advection does."""

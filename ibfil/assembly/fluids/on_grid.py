@@ -74,7 +74,7 @@ class GridModel(ImmersedModel):
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         if rods.bodies:
-            return self.by_table(rods)
+            return self.by_table(rods, inertia=costs.of_inertia(self.grid.cells.tolist(), self.components))
         counts = rods.group_sizes
         return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
 

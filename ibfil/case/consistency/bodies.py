@@ -145,9 +145,6 @@ def _fluid(case: Scene, key: str) -> Iterator[Fault]:
     fluid = case.fluid
     if not fluid.on_grid:
         return
-    if fluid.inertial:
-        found = f"a body with fluid.model = {shown(fluid.model)}"
-        yield Fault(key, found, '"stokes" or "rft" with bodies', ("fluid.model",))
     if fluid.method not in ("auto", "table"):
         yield Fault("fluid.method", f"{shown(fluid.method)} in a scene with bodies", '"table" or "auto"', (key,))
     if fluid.single:

@@ -101,6 +101,7 @@ class WithShells:
         self._c = len(rigid.rods) // shells.nodes
         self._mobility = rigid.rods if spin_drag is None else _with_turns(rigid.rods, spin_drag)
         self._factors: tuple[Stiffness, Factors] | None = None  # and the stiffness they are of
+        self._last: tuple[np.ndarray, np.ndarray] | None = None  # rates of q, and what nodes do
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """Not of scenes with bodies, which have no thermal forces."""
@@ -139,6 +140,11 @@ class WithShells:
         """Velocities of forces on rods and markers, c numbers of each (flat), without the background flow."""
         return self._rigid.whole @ force
 
+    def marker_forces(self) -> np.ndarray:
+        """The forces of markers on the fluid (k, 3), by the last correction."""
+        assert self._last is not None
+        return self._rigid.pushes(*self._last).reshape(-1, 3)
+
     def _solve(self, stiffness: Stiffness, at: np.ndarray, right: np.ndarray) -> np.ndarray:
         """x of (1 - tau M K) x = right (m n, k), columns of -tau M where unknowns are held: there forces are sought."""
         if self._factors is None or self._factors[0] is not stiffness:
@@ -176,7 +182,8 @@ class WithShells:
         dq, reacted = bordered(held, carried, (first, each, own, supports), y, moved / tau, tau)
         weights = np.append(1.0, dq)
         d, force, support = ((weights @ part.reshape(len(part), -1)).reshape(part.shape[1:]) for part in nodes)
-        done = rigid.forces((moved + dq) / tau, force[:, :c].ravel())
+        self._last = (moved + dq) / tau, force[:, :c].ravel()
+        done = rigid.forces(*self._last)
         rows = (self._shells.in_rows(q, y.shape) for q in (dq, done, reacted))
         return Solution(*(np.concatenate(both) for both in zip((d, force, support), rows, strict=True)))
 

@@ -25,6 +25,10 @@ class Shells:
         """How many markers there are."""
         return sum(len(points) for points in self.markers)
 
+    def unknowns(self, rows: int) -> int:
+        """How many unknowns bodies and motors have, where arrays have so many rows."""
+        return 3 * (self.end - self.nodes) + rows - self.end
+
     @property
     def end(self) -> int:
         """The row after those of bodies."""

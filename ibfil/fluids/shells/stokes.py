@@ -54,10 +54,14 @@ class ImmersedBodies(Immersed):
         n, c, nodes = self.shells.nodes, self.coupling.components, self.all_nodes(r, e3)
         whole = self.shells.of_rows(force)
         rigid, felt = self.rigid(nodes, r, e3, time, len(whole)), force[:n, :c].ravel()
-        out = np.zeros((n + self.shells.count, force.shape[1]))
-        out[:n] = force[:n]
-        out[n:, :3] = rigid.pushes(rigid.rates(whole, felt), felt).reshape(-1, 3)
-        return nodes, out
+        return nodes, self.joined(force, rigid.pushes(rigid.rates(whole, felt), felt).reshape(-1, 3))
+
+    def joined(self, force: np.ndarray, markers: np.ndarray) -> np.ndarray:
+        """The forces (n + k, m) of nodes, from those of all rows (N, m), and of markers (k, 3)."""
+        n = self.shells.nodes
+        out = np.zeros((n + len(markers), force.shape[1]))
+        out[:n], out[n:, :3] = force[:n], markers
+        return out
 
 
 class BodyInWall(StepFailed):
@@ -70,6 +74,11 @@ class StokesWithBodies(Memoryless):
     def __init__(self, immersed: ImmersedBodies, lowest: float = -np.inf) -> None:
         """``lowest``: the height below which markers may not come."""
         self.immersed, self.lowest = immersed, lowest
+
+    @property
+    def pushing(self) -> ImmersedBodies:
+        """The ingredients, which tell what all nodes do to the fluid."""
+        return self.immersed
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
@@ -87,7 +96,7 @@ class StokesWithBodies(Memoryless):
         height = float(np.min(immersed.shells.places(r, e3)[:, 2], initial=np.inf))
         if height < self.lowest:
             raise BodyInWall(f"a body went into the wall: a marker at z = {height:.3g}, allowed {self.lowest:.3g}", 0)
-        nodes, p = immersed.all_nodes(r, e3), 3 * (immersed.shells.end - n) + len(r) - immersed.shells.end
+        nodes, p = immersed.all_nodes(r, e3), immersed.shells.unknowns(len(r))
         rods = nodes[:n]
         flow = immersed.advected(rods, r[:n], time)
         rigid = immersed.rigid(nodes, r, e3, time, p)
