@@ -10,25 +10,10 @@ from ibfil.case.reading import parse_case
 from ibfil.fluids.resistive_force import resist
 from ibfil.simulation.simulation import Simulation
 
+from ..helpers.bacterium import cell
+
 CASE = """
-[filament.tail]
-length = {length}
-nodes = {nodes}
-bending = 1e4
-twisting = 1e4
-stretching = 1e6
-radius = 0.02
-shape = {{ kind = "helix", radius = 0.1, pitch = 0.6 }}
-curvature = [{bend}, 0]
-twist_rate = {twist}
-position = [0.2, 0.1, 0]
-anchor = "start"
-normal = [0, 0, -1]
-start = {{ end = "body", body = "head", motor = {{ spin = 1.0, axis = [1, 0, 0] }} }}
-[body.head]
-shape = {{ kind = "sphere", radius = 0.2 }}
-position = [0, 0, 0]
-{more}
+{cell}{more}
 [fluid]
 model = "rft"
 drag = "paper"
@@ -42,11 +27,7 @@ every = 0.4
 
 
 def bacterium(nodes: int, more: str = "") -> Simulation:
-    r, c = 0.1, 0.6 / (2 * np.pi)
-    length, q = float(6 * np.pi * np.hypot(r, c)), r * r + c * c
-    return Simulation(
-        parse_case(CASE.format(length=length, nodes=nodes, bend=r / q, twist=c / q, more=more), "bacterium")
-    )
+    return Simulation(parse_case(CASE.format(cell=cell(nodes, 3.0), more=more), "bacterium"))
 
 
 @pytest.mark.parametrize(

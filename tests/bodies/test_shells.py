@@ -19,6 +19,8 @@ from ibfil.fluids.spaces.wall import NoSlipWall
 from ibfil.grid.kernels import KERNELS
 from ibfil.simulation.simulation import Simulation
 
+from ..helpers.bacterium import cell
+
 SPACING = 1.75
 PLACE = np.array([0.23, 0.41, 0.07])  # in a cell: none of those by which shells are fitted
 BOX = 'model = "stokes"\nbox = [2.4, 2.4, 2.4]\ncells = [48, 48, 48]'
@@ -26,24 +28,7 @@ WALL = 'model = "stokes"\nbox = "free"\nspacing = 0.05\nwall = "no-slip"'
 FREE = 'model = "stokes"\nbox = "free"\nspacing = 0.05'
 
 BACTERIUM = """
-[filament.tail]
-length = {length}
-nodes = {nodes}
-bending = 1e4
-twisting = 1e4
-stretching = 1e6
-radius = 0.02
-shape = {{ kind = "helix", radius = 0.1, pitch = 0.6 }}
-curvature = [{bend}, 0]
-twist_rate = {twist}
-position = [0.2, 0.1, {up}]
-anchor = "start"
-normal = [0, 0, -1]
-start = {{ end = "body", body = "head", motor = {{ spin = 1.0, axis = [1, 0, 0] }} }}
-[body.head]
-shape = {{ kind = "sphere", radius = 0.2 }}
-position = [0, 0, {up}]
-{more}
+{cell}{more}
 [fluid]
 {fluid}
 kernel = "bspline4"
@@ -90,10 +75,7 @@ def swimmer(fluid: str, bend: str = "0") -> Simulation:
 
 
 def bacterium(fluid: str, nodes: int = 25, more: str = "", up: float = 0.0) -> Simulation:
-    r, c, turns = 0.1, 0.6 / (2 * np.pi), 1.5
-    length, q = float(2 * np.pi * turns * np.hypot(r, c)), r * r + c * c
-    known = {"length": length, "nodes": nodes, "bend": r / q, "twist": c / q, "more": more, "fluid": fluid, "up": up}
-    return Simulation(parse_case(BACTERIUM.format(**known), "bacterium"))
+    return Simulation(parse_case(BACTERIUM.format(cell=cell(nodes, 1.5, up), more=more, fluid=fluid), "bacterium"))
 
 
 @pytest.mark.parametrize("axes", [(4.0, 4.0, 4.0), (6.0, 3.0, 3.0), (5.0, 4.0, 3.0)])
@@ -274,6 +256,44 @@ def test_steps_are_of_second_order():
         ends.append(np.concatenate([head.position, head.e1]))
     ratio = np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(ends[1] - ends[2])
     assert 3.3 < ratio < 4.7
+
+
+ALONE = """
+[filament.far]
+length = 1.0
+nodes = 11
+bending = 1.0
+stretching = 1e4
+position = [0, 60, 0]
+[body.ball]
+shape = {{ kind = "sphere", radius = 0.2 }}
+{motion}
+[fluid]
+{fluid}
+kernel = "bspline4"
+viscosity = 1.3
+[time]
+end = 0.1
+step = 0.02
+[output]
+every = 0.1
+"""
+
+
+def test_a_sphere_alone_is_moved_and_turned_against_its_drag():
+    """Stokes' force for a given motion, his velocity for a force; its torque by the radius it turns with."""
+    moved = 'motion = { moves = ["0.5*t", "0", "0"], turns = ["0", "0", "2*t"] }'
+    found = []
+    for motion in (moved, "force = [1.0, 0, 0]"):
+        sim = Simulation(parse_case(ALONE.format(motion=motion, fluid=FREE), "ball"))
+        sim.advance(0.1, lambda: None)
+        found.append(sim.snapshot().bodies["ball"])
+    drag, (given, pushed) = 6 * np.pi * 1.3 * 0.2, found
+    np.testing.assert_allclose(given.force, [0.5 * drag, 0, 0], atol=5e-4 * drag)
+    np.testing.assert_allclose(given.reaction, given.force, atol=1e-12)
+    np.testing.assert_allclose(pushed.velocity, [1 / drag, 0, 0], atol=1e-3 / drag)
+    turning = 2 * 8 * np.pi * 1.3 * 0.2**3 / fitted((4.0, 4.0, 4.0), "bspline4", SPACING, False).rotation[2]
+    np.testing.assert_allclose(given.torque, [0, 0, turning], atol=3e-3 * turning)
 
 
 FAULTS = {
