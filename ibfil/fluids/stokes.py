@@ -102,7 +102,7 @@ class _Dense(ImmersedResponse):
     def root(self) -> DenseRoot:
         return DenseRoot(self.matrix)
 
-    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+    def solve(self, statement: Reduced, right: np.ndarray, error: float) -> np.ndarray:
         rods = statement.frozen()
         if self._factors is None or self._factors[0] is not rods.stiffness:
             system = rods.system((slice(0, len(self.nodes.axes)),), self.matrix, self.tau)
@@ -191,7 +191,7 @@ class _Fourier(ImmersedResponse):
     def root(self) -> Root:
         return self._make_root()
 
-    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+    def solve(self, statement: Reduced, right: np.ndarray, error: float) -> np.ndarray:
         free, index = statement.free, statement.index
 
         def product(x: np.ndarray) -> np.ndarray:
@@ -199,7 +199,7 @@ class _Fourier(ImmersedResponse):
             force[index] += x[index]
             return free * x - self.tau * self.apply(force)
 
-        return self._preconditioner.solve(Asked(self.nodes, self.tau, statement, product), right)
+        return self._preconditioner.solve(Asked(self.nodes, self.tau, statement, product, error), right)
 
 
 class StokesByFFT(Tabulated):
