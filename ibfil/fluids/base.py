@@ -41,6 +41,7 @@ class Solution(NamedTuple):
     move: np.ndarray
     force: np.ndarray  # elastic force and loads as they acted over the step, inertia and reactions included
     reaction: np.ndarray  # of the supports on the rod, zero where nothing is held
+    error: float = 0.0  # relative, of the displacement, beyond round-off: zero where the solve is direct
 
 
 class Response(Protocol):
@@ -56,9 +57,18 @@ class Response(Protocol):
         """The displacements y = target + tau (u0 + M (force + R)); no stiffness."""
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
-        """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K = ``stiffness``."""
+        """One Newton correction d of y: y + d = target + tau (u0 + M (force + K d + R)), K = ``stiffness``.
+
+        ``error``: the relative error of d that serves, where a solve is iterative; 0: as small as it makes it.
+        """
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """A random motion of mean zero and covariance M, of that shape (n, m), of all nodes as if none were held.

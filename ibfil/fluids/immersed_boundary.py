@@ -123,8 +123,11 @@ class ImmersedResponse(ABC):
         """The root of the mobility."""
 
     @abstractmethod
-    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
-        """x (c n,) with (1 - tau M K) x = right; at held unknowns columns of -tau M: forces are sought."""
+    def solve(self, statement: Reduced, right: np.ndarray, error: float) -> np.ndarray:
+        """x (c n,) with (1 - tau M K) x = right; at held unknowns columns of -tau M: forces are sought.
+
+        ``error``: the relative error of x that serves, zero where ``keeps`` says that factors of this system are made.
+        """
 
     def _carried(self, target: np.ndarray) -> np.ndarray:
         """The displacements (n, m) without any force: target + tau u0."""
@@ -153,7 +156,13 @@ class ImmersedResponse(ABC):
         return Solution(y, force + reaction, reaction)
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
         """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
         condensation, c, base = self.immersed.condensation, self.components, self._carried(target)
@@ -163,14 +172,16 @@ class ImmersedResponse(ABC):
         known[index] = statement.value
         push = statement.force + statement.times(known) if index.size else statement.force
         right = (base - y)[:, :c].ravel() + self.tau * self.apply(push) - known
-        x = self.solve(statement, right)
+        # Reactions are sought whole, so that an error relative to x would be one of what they carry, not of the move.
+        error = 0.0 if self.keeps or index.size else error
+        x = self.solve(statement, right, error)
         d, reaction = x.copy(), np.zeros(force.shape)
         d[index] = statement.value
         reaction[index // c, index % c] = x[index]
         move = statement.whole(d)
         felt = force + stiffness.times(move)
         reaction += condensation.react_rest(y + move, base, felt, held, self.tau)
-        return Solution(move, felt + reaction, reaction)
+        return Solution(move, felt + reaction, reaction, error)
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """A random motion of mean zero and covariance M (base.py). Raises NoRoot."""

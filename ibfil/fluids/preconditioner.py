@@ -98,12 +98,13 @@ class KeptFactors:
 
 
 class Asked(NamedTuple):
-    """A linear system to be solved: (1 - tau M K) x = right, by its ``product``."""
+    """A linear system to be solved: (1 - tau M K) x = right, by its ``product``, to a relative ``error`` of x."""
 
     nodes: Nodes
     tau: float
     statement: Reduced
     product: Product
+    error: float = 0.0
 
 
 class Matrix(NamedTuple):
@@ -173,7 +174,7 @@ class RodByRod:
         """``cost``: what making the factors costs, in products; ``couples_torque``: torques are among the unknowns."""
         self._matrix, self._groups = matrix, groups
         self.kept = KeptFactors(cost)
-        self._tolerance = _WITH_TORQUES * _LOOSE if couples_torque else _LOOSE
+        self._share = _WITH_TORQUES if couples_torque else 1.0
         self._source: _Source | None = None
         self._solves = 0
 
@@ -190,7 +191,8 @@ class RodByRod:
             if fresh:
                 self._make(_Source(asked.nodes, asked.tau, asked.statement.frozen()))
             assert kept.blocks is not None
-            found = gmres.solve(asked.product, right, kept.blocks, self._tolerance, _MOST if fresh else kept.patience)
+            tolerance = self._share * max(_LOOSE, asked.error)
+            found = gmres.solve(asked.product, right, kept.blocks, tolerance, _MOST if fresh else kept.patience)
             kept.took(found)
             if found.found or fresh:
                 return _checked(found)

@@ -17,9 +17,9 @@ import numpy as np
 
 from ..bodies.border import Done, Own, Supported, bordered, frozen, supported
 from ..linalg.constraints import Carried, Prescribed
-from ..linalg.stiffness import Stiffness
+from ..linalg.stiffness import Rows, Stiffness
 from .base import Solution
-from .resistive_force import Drag, ResistiveForce, _at, _hold, _Response, _Rows, _system, mobilize, resist
+from .resistive_force import Drag, ResistiveForce, _at, _hold, _Response, _system, mobilize, resist
 from .velocity_gradient import advected, gradient
 
 _CURVING = 1e-2  # of a body's size: the step of second differences of a flow
@@ -109,7 +109,13 @@ class _Bordered(_Response):
         return out
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
         """One correction of nodes and bodies; uses ``stiffness`` up."""
         carried, n, inverse = held.carried, self._n, 1.0 / self.tau
@@ -117,7 +123,7 @@ class _Bordered(_Response):
         base = self._carried(target)
         moved, m = y - base, force.shape[1]
         at, value = _inside(held, carried, y, n * m)
-        rows = _Rows.of(stiffness, np.unique(at // m))
+        rows = Rows.of(stiffness, np.unique(at // m))
         right = _system(stiffness.band, self.drag, self.e3, moved[:n], force[:n], inverse)
         _hold(stiffness.band, right, at, value)
         solve = self._solver(stiffness, at, m)
@@ -148,7 +154,7 @@ class _Bordered(_Response):
         return self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))
 
     def _supports(
-        self, carried: Carried, force: np.ndarray, first: Done, each: Done, rows: _Rows | None
+        self, carried: Carried, force: np.ndarray, first: Done, each: Done, rows: Rows | None
     ) -> Supported | None:
         """The part of supports in the balances. ``rows`` of K; None: forces stay."""
         own = carried.clamps

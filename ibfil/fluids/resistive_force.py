@@ -18,7 +18,7 @@ from numba import njit
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from ..linalg.normal_numbers import Draw, Purpose
-from ..linalg.stiffness import Pairs, Stiffness
+from ..linalg.stiffness import Pairs, Rows, Stiffness
 from ..linalg.vectors import at, dot, mix, put
 from .base import Flow, Memoryless, Solution
 from .velocity_gradient import advected
@@ -144,7 +144,13 @@ class _Response:
         return Solution(y, felt, _at(held, felt - force))
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
         """(K - Z/tau) d = Z/tau (y - target) - Z u0 - f; uses ``stiffness`` up."""
         base = self._carried(target)
@@ -153,7 +159,7 @@ class _Response:
         if not held.at.size:
             d, felt = solve(stiffness, moved, force, held.at, held.value)
             return Solution(d, felt, np.zeros(d.shape))
-        rows = _Rows.of(stiffness, np.unique(held.at // m))
+        rows = Rows.of(stiffness, np.unique(held.at // m))
         d, felt = solve(stiffness, moved, force, held.at, held.value - y.ravel()[held.at])
         rest = felt - force
         rest[rows.nodes] -= rows.times(d)
@@ -196,33 +202,6 @@ def _at(held: Prescribed, values: np.ndarray) -> np.ndarray:
     out = np.zeros_like(values)
     out.ravel()[held.at] = values.ravel()[held.at]
     return out
-
-
-class _Rows(NamedTuple):
-    """The rows of a stiffness at a few ``nodes`` (k,): of the band (k, m, ..), and the coupled pairs of these nodes."""
-
-    nodes: np.ndarray
-    band: np.ndarray
-    pairs: Pairs
-
-    @classmethod
-    def of(cls, stiffness: Stiffness, nodes: np.ndarray) -> _Rows:
-        """A copy of the rows."""
-        rows, columns, blocks = stiffness.pairs
-        here = np.isin(rows, nodes) if stiffness.coupled else slice(0)
-        return cls(nodes, stiffness.band[nodes], Pairs(rows[here], columns[here], blocks[here]))
-
-    def times(self, d: np.ndarray) -> np.ndarray:
-        """(K d) at the nodes (k, m)."""
-        m = d.shape[1]
-        w = (self.band.shape[2] // m - 1) // 2
-        padded = np.concatenate([np.zeros((w, m)), d, np.zeros((w, m))])
-        rows = zip(self.band, self.nodes, strict=True)
-        out = np.array([row @ padded[i : i + 2 * w + 1].ravel() for row, i in rows]).reshape(-1, m)
-        if self.pairs.rows.size:
-            products = (self.pairs.blocks @ d[self.pairs.columns][:, :, None])[:, :, 0]
-            np.add.at(out, np.searchsorted(self.nodes, self.pairs.rows), products)
-        return out
 
 
 class LinearStep(NamedTuple):

@@ -105,7 +105,7 @@ class DenseResponse(ImmersedResponse):
         """Its Cholesky factor."""
         return DenseRoot(self.matrix)
 
-    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+    def solve(self, statement: Reduced, right: np.ndarray, error: float) -> np.ndarray:
         """By LU factors, those of before where the stiffness is the same."""
         rods = statement.frozen()
         if self._factors is None or self._factors[0] is not rods.stiffness:
@@ -195,7 +195,7 @@ class _Fourier(ImmersedResponse):
     def root(self) -> Root:
         return self._make_root()
 
-    def solve(self, statement: Reduced, right: np.ndarray) -> np.ndarray:
+    def solve(self, statement: Reduced, right: np.ndarray, error: float) -> np.ndarray:
         free, index = statement.free, statement.index
 
         def product(x: np.ndarray) -> np.ndarray:
@@ -203,7 +203,7 @@ class _Fourier(ImmersedResponse):
             force[index] += x[index]
             return free * x - self.tau * self.apply(force)
 
-        return self._preconditioner.solve(Asked(self.nodes, self.tau, statement, product), right)
+        return self._preconditioner.solve(Asked(self.nodes, self.tau, statement, product, error), right)
 
 
 class StokesByFFT(Tabulated):

@@ -83,6 +83,34 @@ class Stiffness(NamedTuple):
         return Stiffness(band, Pairs(rows[inside], columns[inside], self.pairs.blocks[inside]))
 
 
+class Rows(NamedTuple):
+    """The rows of a stiffness at a few ``nodes`` (k,): of the band (k, m, ..), and the coupled pairs of these nodes."""
+
+    nodes: np.ndarray
+    band: np.ndarray
+    pairs: Pairs
+
+    @classmethod
+    def of(cls, stiffness: Stiffness, nodes: np.ndarray) -> Rows:
+        """A copy of the rows."""
+        rows, columns, blocks = stiffness.pairs
+        here = np.isin(rows, nodes) if stiffness.coupled else slice(0)
+        return cls(nodes, stiffness.band[nodes], Pairs(rows[here], columns[here], blocks[here]))
+
+    def times(self, d: np.ndarray) -> np.ndarray:
+        """(K d) at the nodes (k, m)."""
+        n, m = d.shape
+        w = (self.band.shape[2] // m - 1) // 2
+        padded = np.zeros((n + 2 * w, m))
+        padded[w : n + w] = d
+        rows = zip(self.band, self.nodes, strict=True)
+        out = np.array([row @ padded[i : i + 2 * w + 1].ravel() for row, i in rows]).reshape(-1, m)
+        if self.pairs.rows.size:
+            products = (self.pairs.blocks @ d[self.pairs.columns][:, :, None])[:, :, 0]
+            np.add.at(out, np.searchsorted(self.nodes, self.pairs.rows), products)
+        return out
+
+
 def nodes_of(ranges: Sequence[slice]) -> np.ndarray:
     """The nodes (k,) of ranges, one after the other."""
     return np.concatenate([np.arange(rod.start, rod.stop) for rod in ranges])

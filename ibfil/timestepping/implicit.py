@@ -13,6 +13,10 @@ from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
 from .base import FAILURES, Bodies, NotConverged, State, Step, StiffnessOf, System, _finish
 
+# Newton's own error after a correction is some hundredth of it: an iterative solve need not be better than a tenth of
+# that. Nodes may differ: of many, one may be off by so many times the relative error of all.
+ERROR, WORST = 3e-4, 10.0
+
 
 @njit(cache=True)
 def _size(move, length):
@@ -47,7 +51,8 @@ class _Equation(NamedTuple):
         """Newton's correction of y, with the exact or the definite ``stiffness`` of the system, and its size."""
         force, inner = self.system.forces(configuration, self.time)
         matrix = stiffness(configuration, self.start, inner, self.time)
-        answer = self.response.implicit(force, matrix, self.prescribed(y, configuration, inner), y, self.target)
+        held = self.prescribed(y, configuration, inner)
+        answer = self.response.implicit(force, matrix, held, y, self.target, ERROR)
         return answer, _size(answer.move, self.system.length)
 
 
@@ -137,7 +142,7 @@ class Implicit:
                 matrix = system.stiffness(configuration, equation.start, inner, equation.time)
                 exact += 1
             held = equation.prescribed(y, configuration, inner)
-            answer = equation.response.implicit(force, matrix, held, y, equation.target)
+            answer = equation.response.implicit(force, matrix, held, y, equation.target, ERROR)
             size = _size(answer.move, system.length)
             rate = size / max(last, self.tolerance)
             if not rate < (0.25 if fresh and before else 1.0):
@@ -146,7 +151,7 @@ class Implicit:
             # Exact matrices square the error, by a factor that settles after the first; a matrix that serves again
             # takes the same part of it each time, which it has to show once.
             known = 10 * rate**2 if exact == count > 2 else 1.0 if before and not fresh else rate
-            coming = size * known if count > 1 else size
+            coming = size * max(known, WORST * answer.error) if count > 1 else size
             if coming < self.tolerance:
                 return y, answer, count
             configuration, last = system.move(equation.start, y), size
@@ -171,7 +176,7 @@ class Implicit:
             part = 1.0 if stride is None else min(1.0, stride / max(_stride(answer.move, configuration), 1e-300))
             y = y + part * answer.move
             # Newton squares the error, so two exact corrections in a row tell the size of the next.
-            coming = size * (size / last) ** 2 if exact and count > 2 else size
+            coming = size * max((size / last) ** 2, WORST * answer.error) if exact and count > 2 else size
             if part == 1.0 and coming < self.tolerance:
                 return y, answer, count
             configuration, exact, last = system.move(equation.start, y), True, size

@@ -72,9 +72,15 @@ class _SteadyResponse:
         return self._inner.forced(force, held, target - self._moved)
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
-        return self._inner.implicit(force, stiffness, held, y, target - self._moved)
+        return self._inner.implicit(force, stiffness, held, y, target - self._moved, error)
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         return self._inner.fluctuation(draw, shape)

@@ -26,7 +26,7 @@ class Inside(Memoryless):
     def response(self, *given: Any) -> Inside:
         return self
 
-    def implicit(self, force, stiffness, held, y, target) -> Solution:
+    def implicit(self, force, stiffness, held, y, target, error=0.0) -> Solution:
         self.asked.append(stiffness)
         move, pushed = 0.5 * force, force.copy()
         if not self.keeps:

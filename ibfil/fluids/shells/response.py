@@ -108,7 +108,13 @@ class WithShells:
         raise NotImplementedError
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
         """One correction of nodes and bodies: of nodes while bodies stay, and by each unknown of these, in one."""
         carried = held.carried
@@ -125,8 +131,8 @@ class WithShells:
         d, reaction = x.copy(), np.zeros_like(x)
         d[:, at], reaction[:, at] = value, x[:, at]
         felt = pushes + _times(stiffness, d, m) + reaction
-        parts = (part.reshape(-1, n, m) for part in (d, felt, reaction))
-        return self._whole(held, carried, Solution(*parts), y, moved)
+        d, felt, reaction = (part.reshape(-1, n, m) for part in (d, felt, reaction))
+        return self._whole(held, carried, Solution(d, felt, reaction), y, moved)
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements without stiffness: by that of none."""
@@ -181,11 +187,12 @@ class WithShells:
             supports = supported(carried.clamps, there[0], there[1:], first, each)
         dq, reacted = bordered(held, carried, (first, each, own, supports), y, moved / tau, tau)
         weights = np.append(1.0, dq)
-        d, force, support = ((weights @ part.reshape(len(part), -1)).reshape(part.shape[1:]) for part in nodes)
+        d, force, support = ((weights @ part.reshape(len(part), -1)).reshape(part.shape[1:]) for part in nodes[:3])
         self._last = (moved + dq) / tau, force[:, :c].ravel()
         done = rigid.forces(*self._last)
         rows = (self._shells.in_rows(q, y.shape) for q in (dq, done, reacted))
-        return Solution(*(np.concatenate(both) for both in zip((d, force, support), rows, strict=True)))
+        move, felt, reaction = (np.concatenate(both) for both in zip((d, force, support), rows, strict=True))
+        return Solution(move, felt, reaction)
 
 
 def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

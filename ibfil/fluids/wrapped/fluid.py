@@ -102,12 +102,19 @@ class _Response:
         return self._of_rods(self.inner.implicit(given, self._minus(own, held), held, y, target), y, target)
 
     def implicit(
-        self, force: np.ndarray, stiffness: Stiffness, held: Prescribed, y: np.ndarray, target: np.ndarray
+        self,
+        force: np.ndarray,
+        stiffness: Stiffness,
+        held: Prescribed,
+        y: np.ndarray,
+        target: np.ndarray,
+        error: float = 0.0,
     ) -> Solution:
         """One Newton correction."""
         constant, own = self._own(force.shape)
         given = force + constant - banded.multiply(own, y - target)
-        return self._of_rods(self.inner.implicit(given, self._less(stiffness, own), held, y, target), y, target)
+        answer = self.inner.implicit(given, self._less(stiffness, own), held, y, target, error)
+        return self._of_rods(answer, y, target)
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """Not known: forces that resist motion have a noise of their own, and cases with both are refused."""
