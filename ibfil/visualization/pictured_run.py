@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,22 +45,25 @@ class Picture:
 class PicturedRun(Run):
     """A run, and its pictures as `ibfil show --plot` and `ibfil render` make them, shown by a notebook or in a file."""
 
-    def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> Picture | Path:
+    def plot(self, path: str | Path | None = None, *, overwrite: bool = False, **look: Any) -> Picture | Path:
         """The figure of the run: shapes, path, observables. In the file ``path`` (png, pdf, svg), or to be shown.
 
-        Raises CaseError for another ending, and where the file exists and ``overwrite`` is not set.
+        ``look`` as moments.Look: begin=0.5, end=1.0 (times), shapes=8 (of each filament), co_moving=True. Raises
+        CaseError for others, for another ending, and where the file exists and ``overwrite`` is not set.
 
         >>> with ibfil.open("run.h5") as run:
         ...     picture = run.plot()
         >>> picture.png[1:4]
         b'PNG'
         """
+        from .moments import Look
         from .run_figure import draw, kind_of
 
+        _known(look, Look._fields)
         if path is None:
-            return _shown(lambda place: draw(self, place))
+            return _shown(lambda place: draw(self, place, Look(**look)))
         refuse(Path(path), kind_of(Path(path)), overwrite, [self.path])
-        draw(self, path)
+        draw(self, path, Look(**look))
         return Path(path)
 
     def render(self, path: str | Path | None = None, *, overwrite: bool = False, **wishes: Any) -> Picture | Path:
@@ -72,15 +75,19 @@ class PicturedRun(Run):
         """
         from .render import Wish, render
 
-        strange = [name for name in wishes if name not in Wish._fields]
-        if strange:
-            raise CaseError([f"{strange[0]}: found a wish of that name; allowed: {', '.join(Wish._fields)}"])
+        _known(wishes, Wish._fields)
         try:
             if path is None:
                 return _shown(lambda place: render(self.path, place, Wish(**wishes), overwrite=True))
             return render(self.path, path, Wish(**wishes), overwrite=overwrite)
         except CaseError as error:  # which names the arguments of the command line
             raise CaseError([fault.replace("--", "") for fault in error.faults]) from None
+
+
+def _known(wishes: Mapping[str, Any], fields: Sequence[str]) -> None:
+    strange = [name for name in wishes if name not in fields]
+    if strange:
+        raise CaseError([f"{strange[0]}: found a wish of that name; allowed: {', '.join(fields)}"])
 
 
 def _shown(make: Callable[[Path], object]) -> Picture:
