@@ -69,11 +69,12 @@ class PicturedRun(Run):
     def render(self, path: str | Path | None = None, *, overwrite: bool = False, **wishes: Any) -> Picture | Path:
         """The rods to scale, at one time or over the run. In the file ``path`` (png, mp4, gif), or to be shown.
 
-        ``wishes`` are those of render.Wish: colour="tension", flow="slice", time=1.0, size=(1280, 960), montage=5,
-        fps=25, every=1. Raises CaseError for others, for what cannot be drawn, and where the file exists and
-        ``overwrite`` is not set.
+        ``wishes`` are those of pictures.Wish: colour="tension", flow="slice", time=1.0, size=(1280, 960), montage=5,
+        fps=25, every=1, view="z", up=(0, 1, 0), zoom=2, box=True, wrap=True, follow="rod", range=(0, 1). Raises
+        CaseError for others, for what cannot be drawn, and where the file exists and ``overwrite`` is not set.
         """
-        from .render import Wish, render
+        from .pictures import Wish
+        from .render import render
 
         _known(wishes, Wish._fields)
         try:
