@@ -175,7 +175,6 @@ NOT_OF_THE_CASE = {
     ("fluids.fields", "vorticity"),
     ("studies.trade.figure", "position"),
     ("visualization.pictures", "none"),
-    ("visualization.pictures", "last"),
     ("visualization.quantities", "last"),
     ("visualization.render", "none"),
 }

@@ -106,7 +106,7 @@ class Pictures:
         return frame._replace(half=frame.half / wish.zoom)
 
     def _place(self) -> None:
-        """What stands where it is: wall, box."""
+        """Place the wall and the box, which stand where they are."""
         height, box = fluid_model(self.run.case).wall, box_of(self.run)
         if height is not None:
             self.stage.wall(height)

@@ -25,7 +25,7 @@ SAMPLED = 100  # outputs that a run's scale is of, at most
 
 
 class Quantity(NamedTuple):
-    """What colours rods: words, dimension, whether it has a sign; its array, and the components it is the size of.
+    """A quantity that colours rods: words, dimension, whether it has a sign; its array, and the components it is the size of.
 
     Positions are no array of a mesh: they are where its points are.
     """
