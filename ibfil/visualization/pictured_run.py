@@ -84,6 +84,16 @@ class PicturedRun(Run):
         except CaseError as error:  # which names the arguments of the command line
             raise CaseError([fault.replace("--", "") for fault in error.faults]) from None
 
+    def page(self, path: str | Path, *, colour: str = "tension", most: float = 20.0, overwrite: bool = False) -> Path:
+        """The run as one self-contained page, ``path`` (.html), that turns in any browser; returns the path.
+
+        ``colour`` is the quantity shown first; outputs are left out evenly to keep it below ``most`` MB. Raises
+        CaseError for what cannot be had, and where the file exists and ``overwrite`` is not set.
+        """
+        from .web.page import write_page
+
+        return write_page(self.path, path, colour=colour, most=most, log=lambda line: None, overwrite=overwrite)
+
 
 def _known(wishes: Mapping[str, Any], fields: Sequence[str]) -> None:
     strange = [name for name in wishes if name not in fields]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.meshes import filament_data
+from ..analysis.meshes import polylines, rods_of
 from ..errors import CaseError
 from ..io.units import label
 from .style import COLOURS
@@ -25,7 +25,7 @@ SAMPLED = 100  # outputs that a run's scale is of, at most
 
 
 class Quantity(NamedTuple):
-    """A quantity that colours rods: words, dimension, whether it has a sign; its array, and the components it is the size of.
+    """A quantity that colours rods: words, dimension, whether it has a sign; its array, and which components count.
 
     Positions are no array of a mesh: they are where its points are.
     """
@@ -131,7 +131,8 @@ def scale_of(run: Run, name: str, limits: str | tuple[float, float], last: int) 
         names = tuple(run.filaments)
         return Scale(name, "filament", f"{OWN}{len(names)}", -0.5, len(names) - 0.5, names=names)
     picked = [last] if limits == "last" else np.unique(np.linspace(0, len(run) - 1, SAMPLED).astype(int))
-    every = np.concatenate([quantity.values(pyvista.wrap(filament_data(run, int(i)))) for i in picked])
+    rods = rods_of(run)
+    every = np.concatenate([quantity.values(pyvista.wrap(polylines(run.snapshot(int(i)), rods))) for i in picked])
     every = every[np.isfinite(every)]
     if isinstance(limits, tuple):
         low, high = limits
