@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import CaseError
-from ..visualization.style import COLOURS, MARKS, drawing, literal, save
+from ..visualization.style import COLOURS, MARKS, drawing, literal, save, with_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def draw(rows: Sequence[Swept], name: str, keys: Sequence[str], title: str, fold
     if not done:
         there = ", ".join(dict.fromkeys(key for row in rows for key in row.numbers)) or "none: no run is done"
         raise CaseError([f"--figure: found {name}; allowed: {there}"])
-    path = folder / f"sweep_{name}.png"
+    path, shown = folder / f"sweep_{name}.png", _labelled(done[0], name)
     with drawing():
         fig = Figure(figsize=(6.4, 4.4), layout="constrained")
         axes = fig.add_subplot()
@@ -56,10 +56,10 @@ def draw(rows: Sequence[Swept], name: str, keys: Sequence[str], title: str, fold
         values = np.array([row.numbers[name] for row in done])
         errors = np.array([row.errors.get(name, 0.0) for row in done])
         if len(keys) == 2 and len(set(places[1][0])) > MAPPED:
-            _map(fig, axes, places, values, name, keys)
+            _map(fig, axes, places, values, shown, keys)
         else:
             _lines(axes, places, values, errors, keys)
-            axes.set_ylabel(literal(name))
+            axes.set_ylabel(shown)
         _scale(axes, "x", *places[0])
         axes.set_xlabel(literal(keys[0]))
         others = [key for key in done[0].setting.values if key not in keys]
@@ -68,6 +68,17 @@ def draw(rows: Sequence[Swept], name: str, keys: Sequence[str], title: str, fold
         axes.set_title(literal(textwrap.fill(title + note, 90)), loc="left")
         save(fig, path)
     return path
+
+
+def _labelled(row: Swept, name: str) -> str:
+    """The observable, a vector's NAME_x for a part of it, with its units as the run has them."""
+    from ..analysis.summary import digest
+    from ..io.reader import RunFile
+
+    with RunFile(row.outcome.path) as run:
+        told = digest(run)["observables"]
+    one = told.get(name) or told.get(name.rpartition("_")[0])
+    return with_units(literal(name), one["units"] if one else "")
 
 
 def _places(texts: Sequence[str]) -> tuple[np.ndarray, list[str]]:
@@ -118,17 +129,31 @@ def _map(
         for i, a in enumerate(across):
             here = (x == a) & (y == b)
             table[j, i] = values[here].mean() if here.any() else np.nan
-    mesh = axes.pcolormesh(across, up, table, cmap="viridis", shading="nearest")
+    mesh = axes.pcolormesh(_edges(*places[0]), _edges(*places[1]), table, cmap="viridis")
     _scale(axes, "y", *places[1])
     axes.set_ylabel(literal(keys[1]))
     bar = fig.colorbar(mesh, ax=axes)
-    bar.set_label(literal(name))
+    bar.set_label(name)
     bar.outline.set_visible(False)
+
+
+def _logarithmic(places: np.ndarray, words: Sequence[str]) -> bool:
+    return not words and bool(places.min() > 0 and places.max() >= LOGARITHMIC * places.min())
+
+
+def _edges(places: np.ndarray, words: Sequence[str]) -> np.ndarray:
+    """The edges (n+1,) of cells about n values, half way between two as the axis shows them."""
+    logarithmic = _logarithmic(places, words)
+    at = np.unique(np.log(places) if logarithmic else places)
+    middles = 0.5 * (at[1:] + at[:-1])
+    half = 0.5 * (at[[1, -1]] - at[[0, -2]]) if len(at) > 1 else np.full(2, 0.5)
+    edges = np.concatenate([[at[0] - half[0]], middles, [at[-1] + half[1]]])
+    return np.exp(edges) if logarithmic else edges
 
 
 def _scale(axes: Axes, side: str, places: np.ndarray, words: Sequence[str]) -> None:
     """The axis of a key: words at their places, a logarithm where values span a decade or more."""
     if words:
         getattr(axes, f"set_{side}ticks")(range(len(words)), [literal(textwrap.shorten(word, 24)) for word in words])
-    elif places.min() > 0 and places.max() >= LOGARITHMIC * places.min():
+    elif _logarithmic(places, words):
         getattr(axes, f"set_{side}scale")("log")

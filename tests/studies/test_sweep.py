@@ -140,6 +140,7 @@ def rows_of(numbers: dict[tuple[str, ...], float], keys: tuple[str, ...], error:
 def figure_of(monkeypatch, tmp_path, rows, keys):
     """The figure as it is saved, and its path."""
     saved = []
+    monkeypatch.setattr(sweep_figure, "_labelled", lambda row, name: name)
     monkeypatch.setattr(sweep_figure, "save", lambda fig, path: saved.append(fig))
     sweep_figure.draw(rows, "speed", keys, "case", tmp_path)
     return saved[0]
@@ -170,6 +171,15 @@ def test_a_second_key_has_lines_and_many_values_of_it_a_map(monkeypatch, tmp_pat
     assert table[8, 2] == 83.0
 
 
+@pytest.mark.parametrize("values", [[1.0, 2.0, 4.0], [0.1, 1.0, 10.0]])
+def test_a_cell_of_a_map_has_its_value_in_its_middle_as_the_axis_shows_it(values):
+    edges = sweep_figure._edges(np.array(values), [])
+    middles = np.sqrt(edges[1:] * edges[:-1]) if values[2] == 10 else None
+    if middles is not None:
+        np.testing.assert_allclose(middles, values)
+    assert np.all((edges[:-1] < values) & (values < edges[1:]))
+
+
 def test_words_stand_at_their_places(monkeypatch, tmp_path):
     axes = figure_of(monkeypatch, tmp_path, rows_of({("rft",): 1.0, ("stokes",): 2.0}, ("model",)), ["model"]).axes[0]
     assert [text.get_text() for text in axes.get_xticklabels()] == ["rft", "stokes"]
@@ -184,6 +194,12 @@ def test_a_sweep_draws_its_observable(here, capsys):
     assert "--figure: found taste; allowed: span" in capsys.readouterr().err
     assert main.main([*command, "--figure", "span", "--against", "time.end"]) == 2
     assert "--against: found time.end; allowed: fluid.viscosity" in capsys.readouterr().err
+
+
+def test_a_figure_has_the_units_of_the_runs(tmp_path):
+    text = "\n".join(["units = { length = 'um' }", BENT.strip()])
+    rows = sweep(text, [axis_of("fluid.viscosity", [1.0])], tmp_path, ["time.end=0.01"], log=lambda line: None)
+    assert sweep_figure._labelled(rows[0], "span") == "span (um)"
 
 
 def test_from_python(tmp_path):
