@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SERIES = 3  # observables drawn; the rest are in --csv
 LINES = 3  # filaments with a line of their own; more are a mean and a band
+TITLE = 60  # letters in a line with the title of a panel
 BAND = (10, 90)  # percent of filaments within the band
 DIAGNOSTICS = {
     "power on the fluid": {"power": ""},
@@ -97,8 +98,10 @@ def _meaning(run: RunFile, name: str) -> str:
     if len(run.filaments) == 1:
         words = words.replace(f" of {next(iter(run.filaments))}", "", 1)
     words = words.replace('"', "").replace(", at = ", " at ")
-    for axis, unit in zip(AXES, ("[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"), strict=True):
-        words = words.replace(f", along = {unit}", f" along {axis}")
+    for k, axis in enumerate(AXES):
+        for sign in (1, -1):
+            unit = [sign * int(i == k) for i in range(3)]
+            words = words.replace(f", along = {unit}", f" along {'-' if sign < 0 else ''}{axis}")
     known = run.case.observe.items()
     own, observe = next(((own, one) for own, one in known if one.recorded(own) == name), (name, None))
     fit = f" ({observe.kind})" if observe is not None and KINDS[observe.kind].number else ""
@@ -117,11 +120,13 @@ def against_time(axes: Axes, run: RunFile, panel: Panel, seen: Moments) -> None:
     wide = 1.4 if len(times) < 1000 else 0.7
     for (word, values), colour in zip(lines.items(), COLOURS, strict=False):
         axes.plot(times, values, color=colour, label=word, lw=wide)
-    if len(lines) > 1:
-        axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(lines), handlelength=1.0, borderaxespad=0.0
-        )
     title = with_units(literal(panel.title), panel.units)
+    if len(lines) > 1:
+        beside = len(title) + sum(4 + len(word) for word in lines) < TITLE
+        place = (
+            {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "borderaxespad": 0.0} if beside else {"loc": "best"}
+        )
+        axes.legend(ncols=len(lines), handlelength=1.0, **place)
     limits = limits_without_start(list(lines.values()))
     if limits is not None and panel.band is None:
         axes.set_ylim(*limits)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.linked_scenes import ASKEW, LINKS, linked
 from helpers.made_run import BENT, make_run
 
 import ibfil
@@ -74,6 +75,19 @@ def test_the_flow_is_the_recorded_field_where_it_lies(run, tmp_path):
     arrows = unpacked(data["arrows"], "i1").reshape(-1, m, n, 2)[-1] / 127
     flat = np.linalg.norm(u[..., :2], axis=-1).T[..., None]
     np.testing.assert_allclose(arrows * flat, u[..., :2].swapaxes(0, 1), atol=0.01 * most)
+
+
+def test_links_are_in_it_from_end_to_end(tmp_path):
+    text = linked(ASKEW, {"spring": LINKS["spring"]}, end=0.04, every=0.02).text
+    ibfil.run(ibfil.parse_case(text, "linked"), tmp_path / "linked.h5")
+    data = data_of(write_page(tmp_path / "linked.h5", tmp_path / "a.html", log=str))
+    with open_run(tmp_path / "linked.h5") as opened:
+        link = opened.links["spring"]
+        ends = np.stack([np.asarray(link["first"]), np.asarray(link["second"])], axis=2)
+    assert data["links"] == ends.shape[1]
+    share = unpacked(data["linked"], "<u2").reshape(ends.shape) / 65535
+    places = np.array(data["low"]) + share * np.array(data["span"])
+    np.testing.assert_allclose(places, ends, atol=0.51 / 65535 * np.max(data["span"]))
 
 
 def test_its_size_is_bounded_and_told(tmp_path):

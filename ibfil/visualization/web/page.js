@@ -5,6 +5,7 @@ const part = (id) => document.getElementById(id);
 const canvas = part("canvas"), pen = canvas.getContext("2d");
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const places = new Uint16Array(bytes(run.positions).buffer); // [output][node][xyz], shares of the reach
+const linked = new Uint16Array(bytes(run.linked).buffer); // [output][element][end][xyz]
 const radius = new Float32Array(bytes(run.radius).buffer); // [node]
 const nodes = radius.length, outputs = run.times.length;
 const colours = run.quantities.map((q) => (q.values === null ? null : bytes(q.values))); // [output][node]
@@ -62,10 +63,8 @@ function draw() {
   canvas.dataset.zoom = state.zoom.toFixed(3);
 }
 
-function position(node) {
-  const at = 3 * (state.output * nodes + node);
-  return [0, 1, 2].map((i) => run.low[i] + (run.span[i] * places[at + i]) / 65535);
-}
+const place = (packed, at) => [0, 1, 2].map((i) => run.low[i] + (run.span[i] * packed[at + i]) / 65535);
+const position = (node) => place(places, 3 * (state.output * nodes + node));
 
 function tubes() { // each segment as strips across it, light from the upper left, the farthest first
   const shown = [], values = colours[state.quantity], map = run.quantities[state.quantity].map;
@@ -78,20 +77,46 @@ function tubes() { // each segment as strips across it, light from the upper lef
     });
     for (let k = 0; k < line.length - 1; k++) {
       const value = values === null ? f % map.length : (values[state.output * nodes + first + k] + values[state.output * nodes + first + k + 1]) >> 1;
-      shown.push([line[k], line[k + 1], across[k], across[k + 1], radius[first + k], radius[first + k + 1], map[value], (line[k][2] + line[k + 1][2]) / 2]);
+      const colour = map[value], depth = (line[k][2] + line[k + 1][2]) / 2;
+      shown.push([depth, () => strips(line[k], line[k + 1], across[k], across[k + 1], radius[first + k], radius[first + k + 1], colour)]);
+      if (k === 0) shown.push([line[0][2], () => cap(line[0], line[1], radius[first], colour)]);
+      if (k === line.length - 2) shown.push([line[k + 1][2], () => cap(line[k + 1], line[k], radius[last], colour)]);
     }
   }
-  shown.sort((a, b) => a[7] - b[7]);
-  for (const segment of shown) strips(...segment, shown.length);
+  for (let k = 0; k < run.links; k++) {
+    const [a, b] = [0, 1].map((end) => project(place(linked, 6 * (state.output * run.links + k) + 3 * end)));
+    shown.push([(a[2] + b[2]) / 2, () => link(a, b)]);
+  }
+  many = shown.length > 5000;
+  shown.sort((a, b) => a[0] - b[0]);
+  for (const [, paint] of shown) paint();
 }
 
-function strips(a, b, m, n, r, q, colour, depth, segments) {
-  const thick = Math.max(1.25, r * scale), wide = Math.max(1.25, q * scale), count = thick < 3 ? 1 : segments > 5000 ? 3 : 7;
-  if (Math.hypot(b[0] - a[0], b[1] - a[1]) < 0.6 * thick) { // seen along its axis
-    const near = a[2] > b[2] ? a : b;
+function link(a, b) {
+  pen.strokeStyle = "#444";
+  pen.lineWidth = 1.5;
+  pen.beginPath();
+  pen.moveTo(a[0], a[1]);
+  pen.lineTo(b[0], b[1]);
+  pen.stroke();
+}
+
+function cap(end, inner, r, colour) { // the flat end of a tube, where it faces the eye
+  const across = Math.hypot(end[0] - inner[0], end[1] - inner[1]), deep = scale * (end[2] - inner[2]), thick = r * scale;
+  if (deep <= 0 || thick < 3) return;
+  pen.fillStyle = shade(colour, 0, 0);
+  pen.beginPath();
+  pen.ellipse(end[0], end[1], (thick * deep) / Math.hypot(across, deep), thick, Math.atan2(end[1] - inner[1], end[0] - inner[0]), 0, 2 * Math.PI);
+  pen.fill();
+}
+
+let many = false;
+function strips(a, b, m, n, r, q, colour) {
+  const thick = Math.max(1.25, r * scale), wide = Math.max(1.25, q * scale), count = thick < 3 ? 1 : many ? 3 : 7;
+  if (m[0] * n[0] + m[1] * n[1] < 0.3) { // it turns about the line of sight
     pen.fillStyle = shade(colour, 0, 0);
     pen.beginPath();
-    pen.arc(near[0], near[1], thick, 0, 2 * Math.PI);
+    pen.arc((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, thick, 0, 2 * Math.PI);
     pen.fill();
   }
   for (let k = 0; k < count; k++) {

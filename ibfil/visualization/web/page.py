@@ -72,7 +72,8 @@ def _picked(run: Run, quantities: int, flow: dict[str, Any] | None, most: float,
     """The outputs that are in the page: all, or as many as its bound allows, evenly."""
     nodes = sum(columns["position"].shape[1] for columns in run.filaments.values())
     room = 1e6 * most - 40e3 - len(run.case_text.encode()) - len(json.dumps(flow))
-    each = 4 / 3 * nodes * (6 + quantities) + 25
+    elements = sum(columns["first"].shape[1] for columns in run.links.values())
+    each = 4 / 3 * (nodes * (6 + quantities) + 12 * elements) + 25
     count = int(min(len(run), room // each))
     if count < 1:
         least = (each + 1e6 * most - room) / 1e6 + 0.1
@@ -96,8 +97,9 @@ def _filled(title: str, content: dict[str, Any]) -> str:
 def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str, Any] | None) -> dict[str, Any]:
     """All that the page knows of the run, as JSON: arrays as base64, little-endian."""
     every = [np.asarray(columns["position"])[picked] for columns in run.filaments.values()]
-    places = np.concatenate(every, axis=1)
-    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    places, links = np.concatenate(every, axis=1), _links(run, picked)
+    both = np.concatenate([places, links.reshape(len(picked), -1, 3)], axis=1)
+    low, high = both.min(axis=(0, 1)), both.max(axis=(0, 1))
     span = np.where(high > low, high - low, 1.0)
     radii = np.concatenate([rod.radius for rod in rods_of(run).values()])
     look = turned(viewpoint(every), None, None, upwards(run.case))
@@ -110,6 +112,8 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
         "lengthunit": "" if units.length == "1" else f" {units.length}",
         "counts": [p.shape[1] for p in every],
         "positions": _packed(np.round((places - low) / span * 65535), "<u2"),
+        "links": links.shape[1],
+        "linked": _packed(np.round((links - low) / span * 65535), "<u2"),
         "radius": _packed(radii, "<f4"),
         "low": low.tolist(),
         "span": span.tolist(),
@@ -122,6 +126,12 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
         "wall": fluid_model(run.case).wall,
         "flow": flow,
     }
+
+
+def _links(run: Run, picked: np.ndarray) -> np.ndarray:
+    """The two ends of each element of all links (T, K, 2, 3)."""
+    each = [np.stack([np.asarray(c["first"])[picked], np.asarray(c["second"])[picked]], 2) for c in run.links.values()]
+    return np.concatenate([np.zeros((len(picked), 0, 2, 3)), *each], axis=1)
 
 
 def _packed(values: np.ndarray, kind: str) -> str:
