@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import pyvista
@@ -17,6 +18,7 @@ from ibfil.analysis import meshes
 from ibfil.commands.main import main
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
+from ibfil.visualization import vtkhdf
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
 
@@ -60,7 +62,6 @@ def run(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("view", [meshes.PLAIN, meshes.View(wrap=True), meshes.View(wrap=True, images=1)])
 def test_filaments_are_those_of_the_run_at_every_time(run, tmp_path, view):
-    """Wrapped ones are cut where they leave the box, so that their lines change from time to time."""
     paths = write_vtkhdf(run, tmp_path, wrap=view.wrap, images=view.images)
     assert [path.name for path in paths] == ["made_filaments.vtkhdf", "made_grid.vtkhdf"]
     read = Read(paths[0])
@@ -68,6 +69,21 @@ def test_filaments_are_those_of_the_run_at_every_time(run, tmp_path, view):
         assert read.times == opened.time.tolist()
         for number in (0, 3, 1, 4, 2):  # in any order
             same(read.at(number), meshes.filament_data(opened, number, view))
+
+
+def test_lines_may_change_from_time_to_time(tmp_path):
+    """As those of filaments that are cut at other faces: more and fewer points, more lines, the same again."""
+    random, made = np.random.default_rng(1), []
+    for time, lengths in enumerate(([3, 4], [3, 4], [2, 5, 3], [3, 4], [6])):
+        points = random.normal(size=(sum(lengths), 3))
+        arrays = [{"a": np.float32(random.normal(size=n)), "b": random.normal(size=(n, 3))} for n in lengths]
+        made.append((0.5 * time, meshes._poly_data(points, lengths, arrays, 0.5 * time)))
+    with h5py.File(tmp_path / "a.vtkhdf", "w") as file:
+        vtkhdf._write_lines(file, iter(made))
+    read = Read(tmp_path / "a.vtkhdf")
+    assert read.times == [0.0, 0.5, 1.0, 1.5, 2.0]
+    for number in (0, 3, 1, 4, 2):
+        same(read.at(number), made[number][1])
 
 
 def test_fields_are_those_of_the_run(run, tmp_path):
@@ -93,8 +109,6 @@ def test_links_have_a_file_of_their_own(tmp_path):
 
 
 def test_lines_that_stay_the_same_are_kept_once(run, tmp_path):
-    import h5py
-
     with h5py.File(write_vtkhdf(run, tmp_path)[0]) as file:
         assert len(file["VTKHDF/Lines/Connectivity"]) == 9 + 7
         assert file["VTKHDF/Points"].shape == (5 * (9 + 7), 3)
