@@ -174,9 +174,9 @@ NOT_OF_THE_CASE = {
     ("fluids.fields", "velocity"),
     ("fluids.fields", "vorticity"),
     ("studies.trade.figure", "position"),
+    ("visualization.pictures", "none"),
+    ("visualization.quantities", "last"),
     ("visualization.render", "none"),
-    ("visualization.stage", "twist"),
-    ("visualization.stage", "speed"),
 }
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
+from ..errors import CaseError
 from ..screen import tell
-from .arguments import DONE, digit, seconds
+from .arguments import DONE, count, digit, seconds
 
 NAME, HELP = "vtk", "write ParaView files: a .pvd collection of filaments and fields"
 
@@ -16,6 +18,8 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", dest="folder", metavar="DIR", help="the folder (default: the run's name)")
     command.add_argument("--wrap", action="store_true", help="bring filaments into the periodic box, cut at its faces")
     command.add_argument("--images", type=digit, default=0, metavar="N", help="periodic images in N boxes on each side")
+    command.add_argument("--every", type=count, default=1, metavar="N", help="every N-th output only; all fields")
+    command.add_argument("--hdf", action="store_true", help="as VTKHDF: one file for all times of filaments, of fields")
     command.add_argument(
         "--watch", type=seconds, nargs="?", const=5.0, metavar="SECONDS", help="follow a run until it ends (5 s)"
     )
@@ -23,9 +27,18 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
+    more: dict[str, Any] = {"wrap": arguments.wrap, "images": arguments.images, "every": arguments.every}
+    if arguments.hdf:
+        from ..visualization.vtkhdf import write_vtkhdf
+
+        if arguments.watch is not None:
+            raise CaseError(["--watch: found with --hdf; allowed: without it, or --hdf again when the run has ended"])
+        for path in write_vtkhdf(arguments.run, arguments.folder, **more):
+            tell(f"open {path} in ParaView")
+        return DONE
     from ..visualization.vtk_files import write_vtk
 
-    more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": tell}
+    more |= {"watch": arguments.watch, "log": tell}
     path = write_vtk(arguments.run, arguments.folder, **more)
     tell(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
     alone = path.with_stem(f"{path.stem}_filaments")

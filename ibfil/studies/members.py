@@ -142,6 +142,21 @@ def _differing(a: Case, b: Case) -> list[str]:
     return [key for key in keys if key.split(".")[0] not in _WORDS and key != "output.checkpoint_every"]
 
 
+def of_other_cases(members: Sequence[Member], folder: Path) -> dict[str, list[str]]:
+    """The members whose file in the folder is a run of another case: by name, the keys in which they differ."""
+    from ..io.reader import RunFile
+
+    found = {}
+    for member in members:
+        path = folder / f"{member.name}.h5"
+        with contextlib.suppress(CaseError):  # at fault, damaged, or of another version: told when it is its turn
+            if path.exists():
+                case = member.resolved()
+                with RunFile(path) as run:
+                    found[member.name] = _differing(run.case, case)
+    return {name: keys for name, keys in found.items() if keys}
+
+
 def _standing(member: Member, folder: Path, log: Log) -> Outcome:
     """How far a member is: as its file says, failed where its case is at fault, waiting where there is work to do."""
     from ..errors import RunFileError

@@ -10,8 +10,8 @@ from typing import Any
 
 from ..errors import CaseError
 from ..screen import tell
-from .member import Outcome
-from .members import run_members, work
+from .member import Member, Outcome
+from .members import of_other_cases, run_members, work
 from .replicas import Mean, means
 from .settings import Axis, Setting, combinations
 from .tables import measured, numbers_with_errors, refuse_strangers, study_members, write_csv, write_json
@@ -58,16 +58,20 @@ def sweep(
     jobs: int = 1,
     executor: Executor | None = None,
     log: Callable[[str], object] = tell,
+    overwrite: bool = False,
 ) -> list[Swept]:
     """Run every combination that is not done yet, and write ``folder``/sweep.csv and .json (with versions, machine).
 
     Thermal runs that differ in their seed alone are summed up in ``folder``/sweep_means.csv. ``case`` is a file, a
     shipped name or a text, ``overrides`` hold for all. Raises CaseError where the case or all combinations are at
-    fault, and Interrupted as `run_members`.
+    fault, and where runs in ``folder`` are of another case and ``overwrite`` is not set; Interrupted as `run_members`.
     """
     settings = combinations(axes)
     refuse_strangers(Path(folder), DETAILS, TABLE, MEANS)
-    outcomes = run_members(study_members(case, overrides, settings), folder, jobs=jobs, executor=executor, log=log)
+    members = study_members(case, overrides, settings)
+    if not overwrite:
+        refuse_other_cases(members, Path(folder))
+    outcomes = run_members(members, folder, jobs=jobs, executor=executor, log=log)
     rows = [_swept(setting, outcome) for setting, outcome in zip(settings, outcomes, strict=True)]
     table, summed = [row.row() for row in rows], [mean.row() for mean in means_over_seeds(rows)]
     more = {"means": summed} if summed else {}
@@ -76,6 +80,20 @@ def sweep(
     if summed:
         write_csv(Path(folder) / MEANS, summed)
     return rows
+
+
+def refuse_other_cases(members: Sequence[Member], folder: Path) -> None:
+    """Raise OtherCases where runs of another case would be computed over."""
+    found = of_other_cases(members, folder)
+    if found:
+        name, keys = next(iter(found.items()))
+        most = ", ".join(keys[:4]) + (", ..." if len(keys) > 4 else "")
+        many = f"{len(found)} of {len(members)} runs are of another case; {name} differs in {most}"
+        raise OtherCases([f"{folder}: {many}; allowed: another folder, or overwrite=True to compute over them"])
+
+
+class OtherCases(CaseError):
+    """Runs of another case stand where those of a sweep are to be."""
 
 
 def means_over_seeds(rows: Sequence[Swept]) -> list[Mean]:
@@ -102,10 +120,20 @@ def listing(case: str, axes: Sequence[Axis], overrides: Sequence[str] = ()) -> l
     return [f"{index}  {member.name}" for index, member in enumerate(members)]
 
 
-def run_one(case: str, axes: Sequence[Axis], folder: str | Path, index: int, overrides: Sequence[str] = ()) -> Outcome:
-    """Run the combination of that ``index`` alone, as a task of a cluster's array does. Raises CaseError."""
+def run_one(
+    case: str,
+    axes: Sequence[Axis],
+    folder: str | Path,
+    index: int,
+    overrides: Sequence[str] = (),
+    *,
+    overwrite: bool = False,
+) -> Outcome:
+    """Run the combination of that ``index`` alone, as a task of a cluster's array does. Raises CaseError as `sweep`."""
     members = study_members(case, overrides, combinations(axes))
     if not 0 <= index < len(members):
         raise CaseError([f"--index {index}: found no such combination; allowed: 0 to {len(members) - 1}"])
+    if not overwrite:
+        refuse_other_cases([members[index]], Path(folder))
     Path(folder).mkdir(parents=True, exist_ok=True)
     return work(members[index], str(folder))

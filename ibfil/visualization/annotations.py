@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
     from PIL.ImageFont import FreeTypeFont
 
-    from .stage import Scale
+    from .quantities import Scale
 
 
 INK, LIGHT = (25, 25, 25), (255, 255, 255)
+NAMES = 5  # of filaments, written at a bar
 TOP, FOOT = 0.07, 0.13  # heights of the bands, of the picture's
 
 
@@ -108,7 +109,7 @@ def _colour_bar(
     """A strip of the colours with three numbers under it and its words above."""
     from PIL.Image import fromarray
 
-    from .stage import colours
+    from .quantities import colours
 
     thick = round(0.02 * height)
     x, y = at[0], at[1] + round(0.045 * height)
@@ -116,6 +117,15 @@ def _colour_bar(
     page.paste(fromarray(np.tile((255 * row).astype(np.uint8), (thick, 1, 1))), (x, y))
     pen.rectangle([(x, y), (x + width, y + thick)], outline=INK)
     pen.text((x + width / 2, y - round(0.008 * height)), bar.label, INK, font, "mb")
-    for share in (0.0, 0.5, 1.0):
-        value = bar.low + share * (bar.high - bar.low)
-        pen.text((x + share * width, y + thick + round(0.008 * height)), f"{value:.3g}", INK, font, "mt")
+    for share, text in _marks(bar):
+        pen.text((x + share * width, y + thick + round(0.008 * height)), text, INK, font, "mt")
+
+
+def _marks(bar: Scale) -> list[tuple[float, str]]:
+    """Places along a bar and their numbers, with a sign at ends that values lie beyond; or names, some of many."""
+    if bar.names:
+        count = len(bar.names)
+        picked = range(count) if count <= NAMES else (0, count - 1)
+        return [((k + 0.5) / count, bar.names[k]) for k in picked]
+    signs = {0.0: "\u2264 " if bar.below else "", 1.0: "\u2265 " if bar.above else ""}
+    return [(share, f"{signs.get(share, '')}{bar.low + share * (bar.high - bar.low):.3g}") for share in (0.0, 0.5, 1.0)]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,8 +22,8 @@ LEGEND = "axes of bodies: first red, second green, third blue"
 CORNERS = 60  # of an outline
 
 
-def add_bodies(plotter: Any, run: Run, output: int) -> None:
-    """Adds the bodies of an output to a picture, in place of those of another one."""
+def add_bodies(show: Callable[..., object], run: Run, output: int) -> None:
+    """Adds the bodies of an output to a picture by ``show``, in place of those of another one."""
     import pyvista
 
     if not run.bodies:
@@ -30,12 +31,12 @@ def add_bodies(plotter: Any, run: Run, output: int) -> None:
     whole = pyvista.wrap(body_surfaces(run, run.snapshot(output)))
     surface = whole.copy()
     surface.lines = np.zeros(0, int)
-    plotter.add_mesh(surface, color=SURFACE, smooth_shading=True, specular=0.2, name="bodies", reset_camera=False)
+    show(surface, color=SURFACE, smooth_shading=True, specular=0.2, name="bodies")
     for k, colour in enumerate(AXES, 1):
         tips = whole.points[whole["axis"] == k].reshape(-1, 2, 3)
         if len(tips):
             lines = pyvista.line_segments_from_points(tips.reshape(-1, 3))
-            plotter.add_mesh(lines, color=colour, line_width=4, lighting=False, name=f"axis {k}", reset_camera=False)
+            show(lines, color=colour, line_width=4, lighting=False, name=f"axis {k}")
 
 
 def add_outlines(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,42 +45,60 @@ class Picture:
 class PicturedRun(Run):
     """A run, and its pictures as `ibfil show --plot` and `ibfil render` make them, shown by a notebook or in a file."""
 
-    def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> Picture | Path:
+    def plot(self, path: str | Path | None = None, *, overwrite: bool = False, **look: Any) -> Picture | Path:
         """The figure of the run: shapes, path, observables. In the file ``path`` (png, pdf, svg), or to be shown.
 
-        Raises CaseError for another ending, and where the file exists and ``overwrite`` is not set.
+        ``look`` as moments.Look: begin=0.5, end=1.0 (times), shapes=8 (of each filament), co_moving=True. Raises
+        CaseError for others, for another ending, and where the file exists and ``overwrite`` is not set.
 
         >>> with ibfil.open("run.h5") as run:
         ...     picture = run.plot()
         >>> picture.png[1:4]
         b'PNG'
         """
+        from .moments import Look
         from .run_figure import draw, kind_of
 
+        _known(look, Look._fields)
         if path is None:
-            return _shown(lambda place: draw(self, place))
+            return _shown(lambda place: draw(self, place, Look(**look)))
         refuse(Path(path), kind_of(Path(path)), overwrite, [self.path])
-        draw(self, path)
+        draw(self, path, Look(**look))
         return Path(path)
 
     def render(self, path: str | Path | None = None, *, overwrite: bool = False, **wishes: Any) -> Picture | Path:
         """The rods to scale, at one time or over the run. In the file ``path`` (png, mp4, gif), or to be shown.
 
-        ``wishes`` are those of render.Wish: colour="tension", flow="slice", time=1.0, size=(1280, 960), montage=5,
-        fps=25, every=1. Raises CaseError for others, for what cannot be drawn, and where the file exists and
-        ``overwrite`` is not set.
+        ``wishes`` are those of pictures.Wish: colour="tension", flow="slice", time=1.0, size=(1280, 960), montage=5,
+        fps=25, every=1, view="z", up=(0, 1, 0), zoom=2, box=True, wrap=True, follow="rod", range=(0, 1). Raises
+        CaseError for others, for what cannot be drawn, and where the file exists and ``overwrite`` is not set.
         """
-        from .render import Wish, render
+        from .pictures import Wish
+        from .render import render
 
-        strange = [name for name in wishes if name not in Wish._fields]
-        if strange:
-            raise CaseError([f"{strange[0]}: found a wish of that name; allowed: {', '.join(Wish._fields)}"])
+        _known(wishes, Wish._fields)
         try:
             if path is None:
                 return _shown(lambda place: render(self.path, place, Wish(**wishes), overwrite=True))
             return render(self.path, path, Wish(**wishes), overwrite=overwrite)
         except CaseError as error:  # which names the arguments of the command line
             raise CaseError([fault.replace("--", "") for fault in error.faults]) from None
+
+    def page(self, path: str | Path, *, colour: str = "tension", most: float = 20.0, overwrite: bool = False) -> Path:
+        """The run as one self-contained page, ``path`` (.html), that turns in any browser; returns the path.
+
+        ``colour`` is the quantity shown first; outputs are left out evenly to keep it below ``most`` MB. Raises
+        CaseError for what cannot be had, and where the file exists and ``overwrite`` is not set.
+        """
+        from .web.page import write_page
+
+        return write_page(self.path, path, colour=colour, most=most, log=lambda line: None, overwrite=overwrite)
+
+
+def _known(wishes: Mapping[str, Any], fields: Sequence[str]) -> None:
+    strange = [name for name in wishes if name not in fields]
+    if strange:
+        raise CaseError([f"{strange[0]}: found a wish of that name; allowed: {', '.join(fields)}"])
 
 
 def _shown(make: Callable[[Path], object]) -> Picture:

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.meshes import filament_data, link_lines
+from ..analysis.meshes import PLAIN, View, filament_data, link_lines
 from .bodies import add_bodies
 from .camera import Viewpoint
+from .quantities import QUANTITIES, Scale, colours
 from .streamlines import evenly_spaced
 
 if TYPE_CHECKING:
     import pyvista
-    from matplotlib.colors import Colormap
 
     from ..analysis.run import Run
 
 
 SIDES = 24  # of a tube
+LEAST = 2.5  # pixels: the least width of a tube
+SAMPLES = 8  # of a pixel
 MARGIN = 1.12  # of what the filaments reach
-TIMES = "viridis"  # all eyes can order it
 FLOW = "Greys"
 LINKS = "Greys"
 ARROWS = 26  # along the width of a picture
@@ -28,16 +30,6 @@ SHEET = 160  # points along the width of a slice
 LINES_APART = 7  # of these points, between two streamlines
 
 THIN = 0.012  # of half the picture's height: the radius of tubes of which many are shown at once
-
-
-class Scale(NamedTuple):
-    """A quantity as colour: its array and component of it, what is written at the bar, the map and its ends."""
-
-    name: str
-    label: str
-    colours: str
-    low: float
-    high: float
 
 
 class Frame(NamedTuple):
@@ -53,16 +45,7 @@ class Frame(NamedTuple):
         return self.look.centre + across[..., None] * self.right + up[..., None] * self.look.up
 
 
-def colours(name: str) -> Colormap:
-    """A map of matplotlib's; viridis without its end that is too light on white."""
-    import matplotlib
-    from matplotlib.colors import ListedColormap
-
-    found = matplotlib.colormaps[name]
-    return ListedColormap(found(np.linspace(0, 0.92, 256))) if name == TIMES else found
-
-
-def frame_for(look: Viewpoint, positions: list[np.ndarray], radius: float, size: tuple[int, int]) -> Frame:
+def frame_for(look: Viewpoint, positions: Sequence[np.ndarray], radius: float, size: tuple[int, int]) -> Frame:
     """The camera that has all positions (T, N, 3), with tubes of that radius, in a picture of ``size`` pixels."""
     right = np.cross(look.up, look.towards)
     every = np.concatenate([p.reshape(-1, 3) for p in positions]) - look.centre
@@ -74,23 +57,40 @@ def frame_for(look: Viewpoint, positions: list[np.ndarray], radius: float, size:
 class Stage:
     """A plotter that shows one moment after the other."""
 
-    def __init__(self, run: Run, frame: Frame, size: tuple[int, int], strongest: float) -> None:
-        """``strongest``: the force of links that is black."""
+    def __init__(self, run: Run, frame: Frame, size: tuple[int, int], strongest: float, view: View = PLAIN) -> None:
+        """``strongest``: the force of links that is black; ``view``: whether filaments are cut at the periodic box."""
         import pyvista
 
-        self._run, self._frame, self._strongest = run, frame, strongest
+        self._run, self._frame, self._strongest, self._view = run, frame, strongest, view
+        self.least = 0.5 * LEAST * 2 * frame.half / size[1]
         plotter: Any = pyvista.Plotter  # whose types mypy cannot follow
         self._plotter = plotter(off_screen=True, window_size=list(size), lighting="three lights")
         self._plotter.set_background("white")
-        self._plotter.enable_anti_aliasing("ssaa")
+        # Where a processor draws, msaa takes a third of the time of ssaa, and looks as well at this many samples.
+        self._plotter.enable_anti_aliasing("msaa", multi_samples=SAMPLES)
         self._plotter.add_axes(color="black", line_width=3, viewport=(0.0, 0.0, 0.14, 0.14 * frame.aspect))
-        camera = self._plotter.camera
-        camera.parallel_projection, camera.parallel_scale = True, frame.half
-        camera.focal_point = frame.look.centre
-        camera.position = frame.look.centre + 10 * frame.look.size * frame.look.towards
-        camera.up = frame.look.up
+        self.aim(frame.look.centre)
         # Behind all rods, so that it hides none of them; seen from afar nothing else changes.
         self._behind = -2.0 * (frame.look.size + frame.half) * frame.look.towards
+
+    def aim(self, centre: np.ndarray) -> None:
+        """Turn the camera to another centre (3,)."""
+        self._frame = self._frame._replace(look=self._frame.look._replace(centre=centre))
+        camera, look = self._plotter.camera, self._frame.look
+        camera.parallel_projection, camera.parallel_scale = True, self._frame.half
+        camera.focal_point = look.centre
+        camera.position = look.centre + 10 * look.size * look.towards
+        camera.up = look.up
+
+    def box(self, box: np.ndarray) -> None:
+        """The edges of the periodic box (3,), which is centred on the origin."""
+        import pyvista
+
+        edges = pyvista.Box([side * half for half in 0.5 * box for side in (-1, 1)]).extract_all_edges()
+        self._show(edges, color="#808080", line_width=2, lighting=False, name="box")
+
+    def _show(self, mesh: Any, **more: Any) -> None:
+        self._plotter.add_mesh(mesh, reset_camera=False, render=False, **more)
 
     def wall(self, height: float) -> None:
         """A wall below the fluid, as wide as the picture, with an edge that is seen from the side too."""
@@ -105,23 +105,23 @@ class Stage:
             i_resolution=1,
             j_resolution=1,
         )
-        self._plotter.add_mesh(sheet, color="#b0a898", opacity=0.5, lighting=False, name="wall", reset_camera=False)
+        self._show(sheet, color="#b0a898", opacity=0.5, lighting=False, name="wall")
         edges = sheet.extract_feature_edges()
-        self._plotter.add_mesh(edges, color="#807868", line_width=3, name="edge of the wall", reset_camera=False)
+        self._show(edges, color="#807868", line_width=3, name="edge of the wall")
 
     def tubes(self, output: int, scale: Scale) -> None:
         """The filaments at an output as tubes to scale, coloured by a quantity."""
         mesh = self._mesh(output)
-        mesh["shown"] = np.asarray(quantity(mesh, scale.name), float)
+        mesh["shown"] = QUANTITIES[scale.name].values(mesh)
         self._add(mesh, scale, "rods")
         self._links(output)
-        add_bodies(self._plotter, self._run, output)
+        add_bodies(self._show, self._run, output)
 
     def shape(self, output: int, scale: Scale) -> bool:
         """One of many shapes in the same picture, coloured by its time, later ones in front; whether it is to scale."""
         mesh = self._mesh(output)
         mesh["shown"] = np.full(mesh.n_points, self._run.time[output])
-        thin = THIN * self._frame.half
+        thin = max(THIN * self._frame.half, self.least)
         to_scale = bool(mesh["tube_radius"].max() <= thin)
         mesh["tube_radius"] = np.minimum(mesh["tube_radius"], thin)
         mesh.points += 3 * thin * output * self._frame.look.towards
@@ -135,7 +135,7 @@ class Stage:
         if not self._run.links:
             return
         lines, largest = pyvista.wrap(link_lines(self._run.snapshot(output))), max(self._strongest, 1e-300)
-        self._plotter.add_mesh(
+        self._show(
             lines,
             scalars="link_force",
             cmap=LINKS,
@@ -144,11 +144,10 @@ class Stage:
             line_width=2.5,
             lighting=False,
             name="links",
-            reset_camera=False,
         )
 
     def _add(self, mesh: pyvista.PolyData, scale: Scale, name: str) -> None:
-        self._plotter.add_mesh(
+        self._show(
             mesh.tube(scalars="tube_radius", absolute=True, n_sides=SIDES, capping=True),
             scalars="shown",
             cmap=colours(scale.colours),
@@ -157,13 +156,14 @@ class Stage:
             smooth_shading=True,
             specular=0.2,
             name=name,
-            reset_camera=False,
         )
 
     def _mesh(self, output: int) -> pyvista.PolyData:
         import pyvista
 
-        return pyvista.wrap(filament_data(self._run, output))
+        mesh = pyvista.wrap(filament_data(self._run, output, self._view))
+        mesh["tube_radius"] = np.maximum(mesh["tube_radius"], self.least)
+        return mesh
 
     def slice(self, time: float, fastest: float) -> None:
         """The speed in the plane of the picture, light to dark."""
@@ -173,7 +173,7 @@ class Stage:
         places = self._frame.at(across, up) + self._behind
         sheet = pyvista.StructuredGrid(*(places[..., i][..., None] for i in range(3)))
         sheet["speed"] = np.linalg.norm(u, axis=-1).ravel(order="F")
-        self._plotter.add_mesh(
+        self._show(
             sheet,
             scalars="speed",
             cmap=colours(FLOW),
@@ -181,7 +181,6 @@ class Stage:
             show_scalar_bar=False,
             lighting=False,
             name="slice",
-            reset_camera=False,
         )
 
     def glyphs(self, time: float, fastest: float) -> None:
@@ -197,7 +196,7 @@ class Stage:
         gap = 2.0 * self._frame.half * self._frame.aspect / ARROWS
         shape = pyvista.Arrow(tip_radius=0.16, shaft_radius=0.05, tip_length=0.35)
         shown = arrows.glyph(orient="flow", scale="long", factor=1.6 * gap, geom=shape)
-        self._plotter.add_mesh(shown, color="#303030", lighting=False, name="glyphs", reset_camera=False)
+        self._show(shown, color="#303030", lighting=False, name="glyphs")
 
     def streamlines(self, time: float, fastest: float) -> None:
         """Lines along the flow in the plane of the picture, evenly apart, over the speed there."""
@@ -214,16 +213,18 @@ class Stage:
         starts = np.cumsum([0, *map(len, lines)])
         cells = [[len(line), *range(start, start + len(line))] for line, start in zip(lines, starts, strict=False)]
         drawn = pyvista.PolyData(np.vstack(lines), lines=np.hstack(cells))
-        self._plotter.add_mesh(
-            drawn, color="#505050", line_width=1.5, lighting=False, name="streamlines", reset_camera=False
-        )
+        self._show(drawn, color="#505050", line_width=1.5, lighting=False, name="streamlines")
         long = [line for line in lines if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() > 1.5 * gap]
         middles = [len(line) // 2 for line in long]
         heads = pyvista.PolyData(np.reshape([line[k] for line, k in zip(long, middles, strict=True)], (-1, 3)))
         heads["flow"] = np.reshape([line[k] - line[k - 1] for line, k in zip(long, middles, strict=True)], (-1, 3))
         size = 0.035 * self._frame.half
         cones = heads.glyph(orient="flow", scale=False, factor=size, geom=pyvista.Cone(radius=0.35, height=1.0))
-        self._plotter.add_mesh(cones, color="#505050", lighting=False, name="heads", reset_camera=False)
+        self._show(cones, color="#505050", lighting=False, name="heads")
+
+    def fastest(self, time: float) -> float:
+        """The largest speed of the fluid in the plane of the picture."""
+        return float(np.nanmax(np.linalg.norm(self._sample(time, SHEET)[2], axis=-1)))
 
     def _sample(self, time: float, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Places across and up (n, m) over the picture, and the velocity (n, m, 3) there."""
@@ -243,24 +244,3 @@ class Stage:
     def close(self) -> None:
         """Give the window back."""
         self._plotter.close()
-
-
-QUANTITIES = {  # what a tube can be coloured by: words, dimension, whether it has a sign
-    "tension": ("tension", "force", True),
-    "moment": ("size of the moment", "force length", False),
-    "curvature": ("curvature", "1/length", False),
-    "twist": ("twist", "1/length", True),
-    "speed": ("speed of the rod", "length/time", False),
-    "force": ("force of a node on the fluid", "force", False),
-    "arclength": ("arclength", "length", False),
-}
-
-
-def quantity(mesh: pyvista.PolyData, name: str) -> np.ndarray:
-    """The values (n,) at the nodes of one of QUANTITIES."""
-    if name == "curvature":
-        return np.linalg.norm(mesh["strain"][:, :2], axis=1)
-    if name == "twist":
-        return np.asarray(mesh["strain"][:, 2])
-    values = np.asarray(mesh["velocity" if name == "speed" else name])
-    return np.linalg.norm(values, axis=1) if values.ndim == 2 else values

@@ -59,6 +59,11 @@ def with_units(name: str, units: str) -> str:
     return f"{name} ({literal(units)})" if units not in ("", "1") else name
 
 
+def with_unit(number: float, unit: str, digits: int = 4) -> str:
+    """A number with its unit, where it has any: "0.6283 s"."""
+    return f"{number:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")
+
+
 def plane_of_motion(positions: Sequence[np.ndarray]) -> tuple[int, int]:
     """The two lab axes, in order, along which the filaments (T, N, 3) reach farthest."""
     low = np.min([p.min(axis=(0, 1)) for p in positions], axis=0)

@@ -1,8 +1,8 @@
 """A run as ParaView files.
 
-One .pvd collection with the real times, a .vtp of all filaments for each output, one of all links and one of all bodies
-where there are any, a .vti for each grid field time, where there are several of these a .pvd of each alone, and a ready
-scene (paraview_scene.py).
+One .pvd collection with the real times, a .vtp of all filaments for each output and one of all links where there are
+any, a .vti for each grid field time, where there are several of these a .pvd of each alone, and a ready scene
+(paraview_scene.py).
 
 Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
 file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
@@ -45,19 +45,21 @@ def write_vtk(
     *,
     wrap: bool = False,
     images: int = 0,
+    every: int = 1,
     watch: float | None = None,
     log: Callable[[str], object] = tell,
 ) -> Path:
     """Write the run file ``run`` into ``folder``, by default the run's name; returns the path of the .pvd.
 
     ``wrap`` brings filaments into the periodic box, cut at its faces; ``images`` adds their periodic images in so many
-    boxes on each side. With ``watch`` it goes on, looking every so many seconds, until the run is no longer running. A
-    time at which only filaments or only fields were written shows the last of the other before it, which is what
-    ParaView itself does with two sources. Raises what `ibfil.open` raises for a file that is no run, CaseError where
-    wrapping or images are asked of a run without a box, OSError where a file cannot be written.
+    boxes on each side; every ``every``-th output is written, and all fields. With ``watch`` it goes on, looking every
+    so many seconds, until the run is no longer running. A time at which only filaments or only fields were written
+    shows the last of the other before it, which is what ParaView itself does with two sources. Raises what `ibfil.open`
+    raises for a file that is no run, CaseError where wrapping or images are asked of a run without a box, OSError where
+    a file cannot be written.
     """
     run = Path(run)
-    collection = Collection(run, run.with_suffix("") if folder is None else Path(folder), View(wrap, images))
+    collection = Collection(run, run.with_suffix("") if folder is None else Path(folder), View(wrap, images), every)
     going_on = collection.update()
     while watch is not None and going_on:
         before = len(collection.filaments)
@@ -71,8 +73,8 @@ def write_vtk(
 class Collection:
     """The .pvd of a run and the files it names. ``update`` writes what is new in the run."""
 
-    def __init__(self, run: Path, folder: Path, view: View = PLAIN) -> None:
-        self.run, self.folder, self.view = run, folder, view
+    def __init__(self, run: Path, folder: Path, view: View = PLAIN, every: int = 1) -> None:
+        self.run, self.folder, self.view, self.every = run, folder, view, every
         self.path = folder / f"{run.stem}.pvd"
         self.filaments: Entries = []
         self.links: Entries = []
@@ -106,10 +108,12 @@ class Collection:
     def _add_filaments(self, run: RunFile) -> None:
         """A .vtp for each output that is not there yet, and one of its links, and of its bodies."""
         for entries in (self.filaments, self.links, self.bodies):
-            _keep_common(entries, run.time)
+            _keep_common(entries, run.time[:: self.every])
         rods, box = rods_of(run), box_of(run)
-        done = len(self.filaments)
+        done = len(self.filaments) * self.every
         for i, frame in enumerate(run.snapshots(done), done):
+            if i % self.every:
+                continue
             file = f"{self.run.stem}_filaments_{i:06d}.vtp"
             _save(polylines(frame, rods, box, self.view), self.folder / file)
             self.filaments.append((frame.time, file))

@@ -14,7 +14,7 @@ from helpers.made_run import SPEED, make_run
 from ibfil.analysis import summary
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
-from ibfil.visualization import run_figure, style
+from ibfil.visualization import run_figure, run_panels, run_series, style
 
 
 @pytest.fixture(scope="module")
@@ -128,8 +128,9 @@ def test_figure_shows_all_there_is(run):
         "Shapes",
         "Centroid",
         "Flow at z",
-        "tip: position (um)",
-        "speed (drift): position (um)",
+        "tip: position of short at finish (um)",
+        "speed (drift): position of short at centroid along y (um)",
+        "Curvature of long",
         "speed of the centroid (um/s)",
         "elastic energy (pN um)",
         "power on the fluid (pN um/s)",
@@ -182,7 +183,7 @@ def test_a_straight_rod_along_x_is_seen_from_z():
 
 def test_wrapped_breaks_the_line_where_it_leaves_the_box():
     r = np.column_stack([np.array([0.5, 0.9, 1.1, 1.5]), np.zeros(4), np.full(4, -0.25)])
-    got = run_figure.wrapped(r, origin=np.array([-1.0, -0.5, 0.0]), box=np.array([2.0, 1.0, 0.5]))
+    got = run_panels.wrapped(r, origin=np.array([-1.0, -0.5, 0.0]), box=np.array([2.0, 1.0, 0.5]))
     assert np.isnan(got[3]).all()
     np.testing.assert_allclose(np.delete(got, 3, axis=0)[:, 0], [0.5, 0.9, 1.0, -1.0, -0.9, -0.5])
     np.testing.assert_allclose(np.delete(got, 3, axis=0)[:, 2], 0.25)
@@ -190,12 +191,12 @@ def test_wrapped_breaks_the_line_where_it_leaves_the_box():
 
 def test_a_start_that_dwarfs_the_rest_is_left_out_of_the_scale():
     rest = np.array([1.0, 2.0, 1.5])
-    low, high = run_figure.limits_without_start([np.append(500.0, rest)])
+    low, high = run_series.limits_without_start([np.append(500.0, rest)])
     assert 0.5 < low < 1.0
     assert 2.0 < high < 2.5
-    assert run_figure.limits_without_start([np.append(4.0, rest)]) is None
-    assert run_figure.limits_without_start([np.append(500.0, [1.0, 1.0, 1.0])]) is None
-    assert run_figure.limits_without_start([np.append(np.nan, rest)]) is None
+    assert run_series.limits_without_start([np.append(4.0, rest)]) is None
+    assert run_series.limits_without_start([np.append(500.0, [1.0, 1.0, 1.0])]) is None
+    assert run_series.limits_without_start([np.append(np.nan, rest)]) is None
 
 
 @pytest.mark.parametrize(("units", "label"), [("1", "time"), ("", "time"), ("s", "time (s)")])
@@ -219,7 +220,12 @@ def test_a_run_without_observables_fields_or_stretch_is_drawn_too(run):
     )
     titles = {axes.get_title(loc="left") for axes in run_figure.figure(bare).axes}
     motion = {"speed of the centroid (um/s)", "elastic energy (pN um)"}
-    assert titles - {""} - motion == {"Shapes", "Centroid: start (ring) to end (dot)", "power on the fluid (pN um/s)"}
+    assert titles - {""} - motion == {
+        "Shapes, 5 over the run",
+        "Centroid, ring to dot; axes of two scales",
+        "Curvature of long",
+        "power on the fluid (pN um/s)",
+    }
 
 
 def test_of_many_names_some_are_listed():

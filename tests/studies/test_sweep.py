@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import csv
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from helpers.made_run import BENT
 
 from ibfil.commands import main
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
-from ibfil.studies.settings import axis, axis_of, combinations
-from ibfil.studies.sweep import sweep
+from ibfil.studies import sweep_figure
+from ibfil.studies.member import Member, Outcome
+from ibfil.studies.settings import Setting, axis, axis_of, combinations
+from ibfil.studies.sweep import Swept, sweep
 from ibfil.studies.tables import write_csv, write_json
 
 
@@ -97,6 +102,104 @@ def test_a_sweep_whose_case_is_at_fault_in_every_form_writes_nothing(here, capsy
     assert main.main(["sweep", "nothing.toml", "--vary", "time.end=1,2"]) == 2
     assert capsys.readouterr().err.count("\n") == 3
     assert [path.name for path in here.iterdir()] == ["bent.toml"]
+
+
+def test_members_of_another_case_are_computed_over_when_asked_only(here, capsys, monkeypatch):
+    command = ["sweep", "bent.toml", "--vary", "fluid.viscosity=1,2", "-o", "out"]
+    assert main.main([*command, "time.end=0.01"]) == 0
+    kept = {path.name: path.read_bytes() for path in (here / "out").iterdir()}
+    capsys.readouterr()
+    for more in ([], ["--index", "0"]):
+        assert main.main([*command, *more, "time.end=0.005"]) == 2
+        told = capsys.readouterr().err
+        assert "runs are of another case; viscosity=1 differs in time.end; allowed: another folder, or --force" in told
+        assert {path.name: path.read_bytes() for path in (here / "out").iterdir()} == kept
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True))
+    for answer, status in (("n", 2), ("y", 0)):
+        monkeypatch.setattr("builtins.input", lambda question, answer=answer: answer)
+        assert main.main([*command, "time.end=0.005"]) == status
+    with RunFile("out/viscosity=1.h5") as run:
+        assert run.case.time.end == 0.005
+    monkeypatch.setattr("sys.stdin", None)
+    assert main.main([*command, "time.end=0.01", "--force"]) == 0
+
+
+def rows_of(numbers: dict[tuple[str, ...], float], keys: tuple[str, ...], error: float = 0.0) -> list[Swept]:
+    return [
+        Swept(
+            Setting("_".join(values), dict(zip(keys, values, strict=True))),
+            Outcome(Member("m", "", ()), "finished", Path("m.h5"), "", 0.0),
+            {"speed": number} if number == number else {},
+            {"speed": error} if error else {},
+            {},
+        )
+        for values, number in numbers.items()
+    ]
+
+
+def figure_of(monkeypatch, tmp_path, rows, keys):
+    """The figure as it is saved, and its path."""
+    saved = []
+    monkeypatch.setattr(sweep_figure, "_labelled", lambda row, name: name)
+    monkeypatch.setattr(sweep_figure, "save", lambda fig, path: saved.append(fig))
+    sweep_figure.draw(rows, "speed", keys, "case", tmp_path)
+    return saved[0]
+
+
+def test_against_one_key_lines_go_through_the_means_of_the_others(monkeypatch, tmp_path):
+    numbers = {("1", "a"): 1.0, ("1", "b"): 3.0, ("100", "a"): 5.0, ("100", "b"): 9.0, ("10", "a"): np.nan}
+    fig = figure_of(monkeypatch, tmp_path, rows_of(numbers, ("x", "seed"), 0.5), ["x"])
+    axes = fig.axes[0]
+    line = axes.get_lines()[0]
+    np.testing.assert_allclose(line.get_xydata(), [[1, 2], [100, 7]])
+    assert axes.get_xscale() == "log"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x", "speed")
+    assert "means over seed; 1 of 5 runs have no number" in axes.get_title(loc="left")
+    assert len(axes.collections) == 1  # the bars
+
+
+def test_a_second_key_has_lines_and_many_values_of_it_a_map(monkeypatch, tmp_path):
+    lines = rows_of({(str(x), w): x * k for x in (1, 2) for k, w in ((1, "rft"), (10, "stokes"))}, ("x", "model"))
+    axes = figure_of(monkeypatch, tmp_path, lines, ["x", "model"]).axes[0]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["rft", "stokes"]
+    many = rows_of(
+        {(str(x), str(y)): x + 10.0 * y for x in range(1, 4) for y in range(9) if (x, y) != (2, 2)}, ("x", "y")
+    )
+    fig = figure_of(monkeypatch, tmp_path, many, ["x", "y"])
+    table = fig.axes[0].collections[0].get_array().reshape(9, 3)
+    assert np.ma.getmaskarray(np.ma.masked_invalid(table)).sum() == 1
+    assert table[8, 2] == 83.0
+
+
+@pytest.mark.parametrize("values", [[1.0, 2.0, 4.0], [0.1, 1.0, 10.0]])
+def test_a_cell_of_a_map_has_its_value_in_its_middle_as_the_axis_shows_it(values):
+    edges = sweep_figure._edges(np.array(values), [])
+    middles = np.sqrt(edges[1:] * edges[:-1]) if values[2] == 10 else None
+    if middles is not None:
+        np.testing.assert_allclose(middles, values)
+    assert np.all((edges[:-1] < values) & (values < edges[1:]))
+
+
+def test_words_stand_at_their_places(monkeypatch, tmp_path):
+    axes = figure_of(monkeypatch, tmp_path, rows_of({("rft",): 1.0, ("stokes",): 2.0}, ("model",)), ["model"]).axes[0]
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["rft", "stokes"]
+
+
+def test_a_sweep_draws_its_observable(here, capsys):
+    command = ["sweep", "bent.toml", "time.end=0.01", "--vary", "fluid.viscosity=1,2", "-o", "out"]
+    assert main.main([*command, "--figure", "span", "--against", "fluid.viscosity"]) == 0
+    assert "out/sweep_span.png, and as pdf" in capsys.readouterr().out
+    assert (here / "out/sweep_span.png").read_bytes().startswith(b"\x89PNG")
+    assert main.main([*command, "--figure", "taste"]) == 2
+    assert "--figure: found taste; allowed: span" in capsys.readouterr().err
+    assert main.main([*command, "--figure", "span", "--against", "time.end"]) == 2
+    assert "--against: found time.end; allowed: fluid.viscosity" in capsys.readouterr().err
+
+
+def test_a_figure_has_the_units_of_the_runs(tmp_path):
+    text = "\n".join(["units = { length = 'um' }", BENT.strip()])
+    rows = sweep(text, [axis_of("fluid.viscosity", [1.0])], tmp_path, ["time.end=0.01"], log=lambda line: None)
+    assert sweep_figure._labelled(rows[0], "span") == "span (um)"
 
 
 def test_from_python(tmp_path):

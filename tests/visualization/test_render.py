@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.made_run import make_run
+from helpers.made_run import BENT, make_run
 
+import ibfil
 from ibfil.analysis.run import open_run
+from ibfil.case.reading import parse_case
 from ibfil.commands.main import main
 from ibfil.errors import CaseError
-from ibfil.visualization import render
+from ibfil.visualization import annotations, render
 from ibfil.visualization.annotations import Words, bands, lettered
-from ibfil.visualization.camera import viewpoint
-from ibfil.visualization.render import Wish
-from ibfil.visualization.stage import Scale, frame_for
+from ibfil.visualization.camera import direction, turned, upwards, viewpoint
+from ibfil.visualization.pictures import Pictures, Wish
+from ibfil.visualization.quantities import Scale
+from ibfil.visualization.stage import frame_for
 
 SIZE = (320, 240)
 draws = pytest.mark.skipif(
@@ -153,6 +157,123 @@ def test_a_film_has_a_picture_for_each_output(run, tmp_path, ending):
     assert np.abs(snapshots[0].astype(int) - snapshots[-1]).max() > 100
 
 
+def made_pictures(run: Path, wish: Wish, shown: list[int]) -> Pictures:
+    render.can_render()
+    return Pictures(open_run(run), wish._replace(size=SIZE), shown)
+
+
+@draws
+def test_colours_of_the_flow_are_those_of_the_field_that_is_shown(tmp_path, monkeypatch):
+    """A held rod in a uniform stream: it does not move, and all is one grey, black by the rods' own speed."""
+    from ibfil.analysis.run import Run
+
+    path = make_run(tmp_path / "held.h5")
+    monkeypatch.setattr(Run, "velocity_at", lambda self, points, time=None: np.tile([0.0, 0.0, 7.0], (len(points), 1)))
+    pictures = made_pictures(path, Wish(flow="slice"), [4])
+    assert pictures.fastest == 7.0
+    assert (pictures.words.bars[1].low, pictures.words.bars[1].high) == (0.0, 7.0)
+    pictures.close()
+
+
+@draws
+def test_a_scale_is_of_the_run_of_the_last_picture_or_given_and_marks_what_is_beyond(run):
+    """Positions along y go from 0 to 3 in the run, of which the last picture has the end."""
+    found = {}
+    for limits in ("run", "last", (1.0, 2.0)):
+        pictures = made_pictures(run, Wish("position.y", range=limits), [2])
+        found[limits] = pictures.scale
+        pictures.close()
+    assert found["run"].low < 0.2
+    assert found["run"].high > 2.8
+    assert found["last"][3:7] == (0.5, 2.5, False, False)  # all at 1.5: a range about it
+    assert found[1.0, 2.0][3:7] == (1.0, 2.0, True, True)
+    assert [text for _, text in annotations._marks(found[1.0, 2.0])] == ["\u2264 1", "1.5", "\u2265 2"]
+
+
+@draws
+def test_filaments_have_their_own_colours_and_names(run, tmp_path):
+    pictures = made_pictures(run, Wish("filament"), [0])
+    assert [text for _, text in annotations._marks(pictures.scale)] == ["long", "short"]
+    picture = pictures.one(0).astype(int)
+    for red, green, blue in ((0, 114, 178), (213, 94, 0)):  # of Okabe and Ito, under lights
+        near = np.abs(picture - [red, green, blue]).max(axis=-1) < 50
+        assert near[20:-40].sum() > 100
+    pictures.close()
+
+
+@draws
+def test_a_thin_rod_is_as_wide_as_can_be_seen_and_a_note_says_so(tmp_path):
+    """Radius 1e-4 of the length: by itself less than a tenth of a pixel."""
+    text = BENT.replace("nodes = 9", "nodes = 9\nradius = 1e-4").replace("end = 0.02", "end = 0.005")
+    ibfil.run(parse_case(text, "thin"), tmp_path / "thin.h5")
+    pictures = made_pictures(tmp_path / "thin.h5", Wish("arclength"), [1])
+    assert "rods drawn 2.5 pixels wide where they are thinner" in pictures.words.note
+    shown = coloured(pictures.one(1).astype(int))
+    pictures.close()
+    columns = shown.any(axis=0)
+    assert columns.mean() > 0.6  # an unbroken line across the picture
+    assert 1.2 < shown.sum() / columns.sum() < 5.0
+
+
+@draws
+def test_the_camera_follows_a_filament(run):
+    """`short` glides 3 along y, and stays where it is in the picture."""
+    pictures = made_pictures(run, Wish("filament", follow="short"), [0, 4])
+    middles = []
+    for output in (0, 4):
+        picture = pictures.one(output).astype(int)
+        own = np.abs(picture - [213, 94, 0]).max(axis=-1) < 60
+        own[-40:] = False
+        middles.append(np.argwhere(own).mean(axis=0))
+    pictures.close()
+    np.testing.assert_allclose(middles[0], middles[1], atol=3)
+
+
+@draws
+def test_the_box_and_what_is_brought_into_it(run):
+    """Wrapped ones lie within the box, whose corners the camera has: the view does not depend on how far they went."""
+    wrapped, plain = made_pictures(run, Wish(wrap=True, box=True), [4]), made_pictures(run, Wish(), [4])
+    assert wrapped.stage._mesh(4).points[:, 1].max() <= 1.0 + 1e-6
+    assert plain.stage._mesh(4).points[:, 1].max() > 2.0
+    assert {"box"} <= set(wrapped.stage._plotter.actors)
+    for pictures in (wrapped, plain):
+        pictures.close()
+
+
+def test_up_is_off_a_wall_and_against_weight():
+    rod = BENT.replace("[fluid]", "[filament.rod.loads]\nweight = [0, -2.0, 0]\n[fluid]")
+    np.testing.assert_allclose(upwards(parse_case(rod, "heavy")), [0, 1, 0])
+    np.testing.assert_allclose(upwards(ibfil.read_case("cilia_row")), [0, 0, 1])
+    assert upwards(parse_case(BENT, "bent")) is None
+
+
+@pytest.mark.parametrize(("view", "up"), [("x", "y"), ("-z", "x"), ("1,1,1", "z"), ((0, 2, 0), (1, 0, 0))])
+def test_the_camera_is_put_where_it_is_asked_to_be(view, up):
+    look = viewpoint([np.random.default_rng(2).uniform(-1, 1, (4, 9, 3))])
+    a, b = direction("--view", view), direction("--up", up)
+    got = turned(look, a, b, None)
+    np.testing.assert_allclose(got.towards, a)
+    assert got.up @ b > 0.5
+    assert abs(got.up @ got.towards) < 1e-12
+
+
+def test_a_scene_is_not_looked_at_from_below():
+    look = viewpoint([np.random.default_rng(2).uniform(-1, 1, (4, 9, 3))])
+    for way in np.vstack([np.eye(3), -np.eye(3)]):
+        got = turned(look, None, None, way)
+        assert got.towards @ way > 0
+        assert got.up @ way > 0
+
+
+def test_a_film_tells_how_long_it_will_take(tmp_path):
+    pytest.importorskip("imageio.v2", reason="imageio is not installed: films are not tested")
+    told: list[str] = []
+    still = (np.zeros((160, 160, 3), np.uint8) for _ in range(3))
+    render._save_film(tmp_path / "a.gif", still, 5.0, 3, told.append)
+    assert re.search(r"1 of 3 pictures, .* left$", told[0])
+    assert told[-1].endswith("3 of 3 pictures")
+
+
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 
@@ -167,6 +288,13 @@ def test_a_film_has_a_picture_for_each_output(run, tmp_path, ending):
         ("a.png", Wish(size=(32000, 24000)), "--size: found 32000x24000"),
         ("a.mp4", Wish(montage=5), "--montage, --time: found with a film"),
         ("a.png", Wish(montage=-1), "--montage: found -1"),
+        ("a.png", Wish(view="up"), "--view: found up; allowed: x, y, z, -x"),
+        ("a.png", Wish(up=(0, 0, 0)), "--up: found"),
+        ("a.png", Wish(view="z", up="-z"), "--view, --up: found directions along one line"),
+        ("a.png", Wish(zoom=0.0), "--zoom: found 0"),
+        ("a.png", Wish(follow="tall"), "--follow: found tall; allowed: long, short"),
+        ("a.png", Wish(follow="long", wrap=True), "--follow: found with --wrap"),
+        ("a.png", Wish(range="2,1"), "--range: found 2,1; allowed: run, last, or LOW,HIGH"),
         ("a.gif", Wish(fps=0.0), "--fps, --every: found 0, 1"),
     ],
 )

@@ -1,0 +1,168 @@
+"""A run as VTKHDF: `ibfil vtk --hdf`, one file for all times of the filaments, one of the links, one of the fields.
+
+    /VTKHDF                 Type, Version; of an image WholeExtent, Origin, Spacing, Direction
+    /VTKHDF/Steps           NSteps, Values (the times), and where each time begins in the arrays
+    /VTKHDF/Points, Lines   places; polylines, which are kept once for as long as they stay the same
+    /VTKHDF/PointData/...   (points of all times one after the other, ...) of lines; (time, z, y, x, ...) of images
+
+ParaView 5.12 and later open it. The layout is of Kitware's file format VTKHDF 2.0; arrays are those of the .vtp and
+.vti files, to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of
+from ..errors import CaseError
+from ..io.overwriting import Kind, refuse, replacing
+from ..io.reader import RunFile
+
+if TYPE_CHECKING:
+    from vtkmodules.vtkCommonDataModel import vtkDataSet
+
+
+VTKHDF = Kind("a file of VTKHDF", lambda path, head: head.startswith(b"\x89HDF") and b"VTKHDF" in head)
+_KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # of cells, in the order of the offsets
+
+
+def write_vtkhdf(
+    run: str | Path, folder: str | Path | None = None, *, wrap: bool = False, images: int = 0, every: int = 1
+) -> list[Path]:
+    """Write the run file ``run`` into ``folder``, by default the run's name, as VTKHDF; returns the paths.
+
+    RUN_filaments.vtkhdf, and RUN_links.vtkhdf and RUN_grid.vtkhdf where there are any; ``wrap`` and ``images`` as of
+    `ibfil.write_vtk`; every ``every``-th output, and all fields. A file is whole or not there. Raises CaseError for
+    wrapping or images without a box, RunFileError where another kind of file stands in the place, and as `ibfil.open`.
+    """
+    run, view = Path(run), View(wrap, images)
+    folder = run.with_suffix("") if folder is None else Path(folder)
+    with RunFile(run) as opened:
+        rods, box = rods_of(opened), box_of(opened)
+        if view != PLAIN and box is None:
+            allowed = "a run in a periodic box, which rft and free space have not"
+            raise CaseError([f"{run}: found --wrap or --images; allowed: {allowed}"])
+        folder.mkdir(parents=True, exist_ok=True)
+
+        def shown() -> Iterator[Any]:
+            return (snapshot for i, snapshot in enumerate(opened.snapshots()) if i % every == 0)
+
+        paths = [_place(folder, run, "filaments")]
+        _write(paths[0], lambda file: _write_lines(file, ((s.time, polylines(s, rods, box, view)) for s in shown())))
+        if opened.links:
+            paths.append(_place(folder, run, "links"))
+            _write(paths[-1], lambda file: _write_lines(file, ((s.time, link_lines(s)) for s in shown())))
+        if opened.grid is not None and len(opened.grid.time):
+            paths.append(_place(folder, run, "grid"))
+            _write(paths[-1], lambda file: _write_fields(file, opened))
+    return paths
+
+
+def _place(folder: Path, run: Path, kind: str) -> Path:
+    path = folder / f"{run.stem}_{kind}.vtkhdf"
+    refuse(path, VTKHDF, True, [run])
+    return path
+
+
+def _write(path: Path, fill: Callable[[h5py.File], None]) -> None:
+    with replacing(path) as part, h5py.File(part, "w", libver=("v108", "v108")) as file:
+        fill(file)
+
+
+def _root(file: h5py.File, kind: str) -> h5py.Group:
+    root = file.create_group("VTKHDF")
+    root.attrs.create("Type", kind.encode("ascii"), dtype=h5py.string_dtype("ascii", len(kind)))
+    root.attrs["Version"] = np.array([2, 0], np.int64)
+    return root
+
+
+def _append(group: h5py.Group, name: str, rows: np.ndarray) -> None:
+    """More rows of a dataset, which is made for the first ones."""
+    if name not in group:
+        chunk = max(1, min(len(rows), 2**18 // max(rows[:1].nbytes, 1)))
+        chunks = (chunk, *rows.shape[1:])
+        group.create_dataset(name, data=rows, maxshape=(None, *rows.shape[1:]), chunks=chunks)
+        return
+    dataset = group[name]
+    dataset.resize(len(dataset) + len(rows), axis=0)
+    dataset[len(dataset) - len(rows) :] = rows
+
+
+def _write_lines(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) -> None:
+    """A temporal PolyData of polylines: points of all times, and lines where they differ from those before."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    root = _root(file, "PolyData")
+    steps, data = root.create_group("Steps"), root.create_group("PointData")
+    begins = steps.create_group("PointDataOffsets")
+    for kind in _KINDS:
+        root.create_group(kind)
+    last, part, cells, ids, points = np.zeros(0, np.int64), -1, 0, 0, 0
+    new_cells = new_ids = 0
+    for count, (time, mesh) in enumerate(meshes, 1):
+        lines = mesh.GetLines()
+        offsets, each = (vtk_to_numpy(a) for a in (lines.GetOffsetsArray(), lines.GetConnectivityArray()))
+        if not np.array_equal(offsets, last):  # polylines one after the other: where each begins says all
+            part, cells, ids, last = part + 1, cells + new_cells, ids + new_ids, offsets
+            new_cells, new_ids = len(offsets) - 1, len(each)
+            _append_topology(root, offsets, each)
+        arrays = mesh.GetPointData()
+        for i in range(arrays.GetNumberOfArrays()):
+            array = arrays.GetArray(i)
+            _append(data, array.GetName(), vtk_to_numpy(array))
+            _append(begins, array.GetName(), np.array([points]))
+        _append(root, "Points", vtk_to_numpy(mesh.GetPoints().GetData()))
+        _append_step(steps, time, part, points, cells, ids)
+        steps.attrs["NSteps"] = count
+        points += mesh.GetNumberOfPoints()
+
+
+def _append_topology(root: h5py.Group, offsets: np.ndarray, each: np.ndarray) -> None:
+    """A part: its lines, and none of the other kinds of cells."""
+    _append(root, "NumberOfPoints", np.array([len(each)]))
+    for kind in _KINDS:
+        own = kind == "Lines"
+        _append(root[kind], "Offsets", offsets if own else offsets[:1])
+        _append(root[kind], "NumberOfCells", np.array([len(offsets) - 1 if own else 0]))
+        _append(root[kind], "NumberOfConnectivityIds", np.array([len(each) if own else 0]))
+        _append(root[kind], "Connectivity", each if own else each[:0])
+
+
+def _append_step(steps: h5py.Group, time: float, part: int, points: int, cells: int, ids: int) -> None:
+    """A time: the part that it shows, and where its points and lines begin."""
+    _append(steps, "Values", np.array([time]))
+    _append(steps, "NumberOfParts", np.array([1]))
+    _append(steps, "PartOffsets", np.array([part]))
+    _append(steps, "PointOffsets", np.array([points]))
+    for name, begin in (("CellOffsets", cells), ("ConnectivityIdOffsets", ids)):
+        _append(steps, name, np.array([[begin if kind == "Lines" else 0 for kind in _KINDS]]))
+
+
+def _write_fields(file: h5py.File, run: RunFile) -> None:
+    """A temporal ImageData of the fields, of which every time has a slice."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    grid = run.grid
+    assert grid is not None
+    root = _root(file, "ImageData")
+    steps, data = root.create_group("Steps"), root.create_group("PointData")
+    begins = steps.create_group("PointDataOffsets")
+    for number, time in enumerate(np.asarray(grid.time)):
+        image = field_data(run, number)
+        if not number:
+            root.attrs["WholeExtent"] = np.array(image.GetExtent(), np.int32)
+            root.attrs["Origin"], root.attrs["Spacing"] = np.array(image.GetOrigin()), np.array(image.GetSpacing())
+            root.attrs["Direction"] = np.eye(3).ravel()
+        shape, arrays = image.GetDimensions()[::-1], image.GetPointData()
+        for i in range(arrays.GetNumberOfArrays()):
+            array = arrays.GetArray(i)
+            values = vtk_to_numpy(array)
+            _append(data, array.GetName(), values.reshape(1, *shape, *values.shape[1:]))
+            _append(begins, array.GetName(), np.array([number]))
+        _append(steps, "Values", np.array([float(time)]))
+        steps.attrs["NSteps"] = number + 1
