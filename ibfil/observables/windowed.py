@@ -129,21 +129,6 @@ class Power(Windowed, kind="power"):
         return float(np.sum(filament.power[self.inside]))
 
 
-class Dissipation(ObservableBase, kind="dissipation"):
-    """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
-
-    On a grid it costs an evaluation of the fluid at each output.
-    """
-
-    keys: ClassVar[tuple[str, ...]] = SUMMARY
-    dimension = "force length/time"
-    description = "power turned into heat by the fluid, filaments together, one"
-
-    def sample(self, snapshot: Snapshot) -> Value:
-        """At one output."""
-        return float(snapshot.diagnostics["dissipation"])
-
-
 def _lab_moment(filament: FilamentSnapshot, s: np.ndarray, node: int) -> np.ndarray:
     """Moment (3,) at an end node in the lab frame; its tangent by one-sided differences of second order."""
     three = slice(0, 3) if node == 0 else slice(-3, None)

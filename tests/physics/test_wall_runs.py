@@ -139,7 +139,7 @@ def test_a_pulled_rod_pumps_its_force_times_its_height(tmp_path: Path):
             np.einsum("ijkc,i,j,k->c", field[tuple(slice(b, b + 4) for b in base[q])], *weights[q]) for q in range(9)
         ]
         assert run.velocity_at(points) == pytest.approx(np.array(got), abs=2e-6 * np.abs(got).max())
-        assert np.array_equal(run.diagnostics["grid_power"], run.diagnostics["dissipation"])
+        assert np.array_equal(run.diagnostics["grid_power"], run.diagnostics["flow_dissipation"])
 
 
 def test_what_is_told_of_a_wall():
