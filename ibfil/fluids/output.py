@@ -14,7 +14,6 @@ from .fields import GridFields
 from .immersed_boundary import Immersed, ImmersedResponse
 from .resistive_force import ResistiveForce
 
-
 Powers = dict[str, float | np.ndarray]
 
 
@@ -37,8 +36,8 @@ class FluidOutput(Protocol):
 def powers(flow: float, slip: float, spin: float, background: float) -> Powers:
     """Powers by the name of their series: what is turned into heat and its parts, and F.u0 of a background flow u0.
 
-    ``flow`` is the heat of the flow that forces drive, or of drag; ``slip`` that between nodes and grid; ``spin`` that of
-    spins which the flow does not take part in.
+    ``flow`` is the heat of the flow that forces drive, or of drag; ``slip`` that between nodes and grid; ``spin`` that
+    of spins which the flow does not take part in.
     """
     return {
         "dissipation": flow + slip + spin,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..io.snapshots import FilamentSnapshot, Snapshot
-from .base import ObservableBase, Unfit, Value
+from .base import Unfit, Value
 from .local import SUMMARY, OfFilament, distance_across
 from .location import Location
 
