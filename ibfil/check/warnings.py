@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 NODES_A_WAVE = 8  # wavelength/ds below which nodes do not resolve a wave: at 5.3 a swimmer is 2 % off, at 2.7 20 times
 SLOWED, DAMPED = 0.02, 0.2  # by which steps may change omega, and the decay, of a rod's own oscillation
 FLUCTUATION = 0.05  # mean square of a thermal angle between nodes that is still small
-QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
+HALF_TURNS = 1.0  # the same, of angles of twist between nodes, above which some are soon half a turn
 JUMP = 1e-6  # of the larger value: a difference between the ends of a closed rod that is none
 STRAINED = 1e-6  # of the length of a filament: strain of a link at the start that is none
 STIFF = 1e6  # stiffness of a link times the step over the drag of a node: beyond it Krylov's forces drift
@@ -178,11 +178,7 @@ def _softness(key: str, filament, energy: float) -> list[str]:
             out.append(
                 f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: "
                 f"{value / FLUCTUATION:.2g} times that modulus, or {enough} nodes"
-                + (
-                    "; as it is, some are soon a quarter turn apart, which stops the run"
-                    if value > QUARTER_TURNS
-                    else ""
-                )
+                + ("; as it is, some are soon half a turn apart, which stops the run" if value > HALF_TURNS else "")
             )
     return out
 

@@ -195,7 +195,7 @@ def survivors(count: int, steps: int) -> Iterator[str]:
             while simulation.steps < steps:
                 simulation.advance(simulation.time + 100 * simulation.step_length, lambda: None)
         except RunFailed as failed:
-            soon = [line for line in warnings(simulation) if "soon a quarter turn apart, which stops the run" in line]
+            soon = [line for line in warnings(simulation) if "soon half a turn apart, which stops the run" in line]
             yield "told" if soon and "twist between two nodes" in str(failed) else str(failed)
             continue
         yield "runs"
