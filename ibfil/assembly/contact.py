@@ -88,8 +88,8 @@ def refuse_crossed(case: Case, touching: Contact, names: Sequence[str], r: np.nd
         first, second = names[segments.rod[pairs.i[k]]], names[segments.rod[pairs.j[k]]]
         raise CaseError(
             [
-                f"{case.file}: filament.{first}: found laid through {second} at s = {s[k]:.3g} and {other[k]:.3g}, with "
-                f'no side to part to under contact.action = "repel"; allowed: axes apart, by {1e-3 * reach[k]:.1g} or '
-                "more, as by another position"
+                f"{case.file}: filament.{first}: found laid through {second} at s = {s[k]:.3g} and {other[k]:.3g}, "
+                'with no side to part to under contact.action = "repel"; allowed: axes apart, by '
+                f"{1e-3 * reach[k]:.1g} or more, as by another position"
             ]
         )

@@ -107,7 +107,7 @@ class Asked(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """The exact mobility of nodes: ``of`` (nodes, own), what each node moves by itself (n, c), c, and units of motions."""
+    """The exact mobility of nodes: ``of`` (nodes, own), what each moves alone (n, c), c, and units of motions."""
 
     of: Callable[[Nodes, np.ndarray], np.ndarray]
     own: np.ndarray

@@ -1,6 +1,7 @@
 """From nodes and frames to tangents, strains and spacing: everything the forces are made of.
 
-r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 = -e2.r'', O2 = e1.r'', O3 = psi/ds (after Eq. 39).
+r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 = -e2.r'', O2 = e1.r'', O3 = psi/ds (Eq.
+39 has its sine).
 """
 
 from __future__ import annotations
@@ -92,7 +93,9 @@ def _measure_node(g, i, r_s, r_ss, e1):
 def _measure_segments(mesh, g):
     """Writes d, |d| and O3 = psi/ds of every segment, psi the turn of e1 about the rod (Eq. 39 has its sine):
 
-    tan psi = (e2_a.e1_b - e2_b.e1_a)/(e1_a.e1_b + e2_a.e2_b),     e1 carried from e3_a to e3_b without spin having psi = 0
+    tan psi = (e2_a.e1_b - e2_b.e1_a)/(e1_a.e1_b + e2_a.e2_b)
+
+    An e1 that is carried from e3_a to e3_b without spin (Eq. 41) has psi = 0.
     """
     for i in range(g.shape[0]):
         if mesh.joined[i]:
