@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from shlex import quote
 
 from ..screen import tell
 from .arguments import DONE, digit, seconds
@@ -27,7 +28,8 @@ def do(arguments: argparse.Namespace) -> int:
 
     more = {"wrap": arguments.wrap, "images": arguments.images, "watch": arguments.watch, "log": tell}
     path = write_vtk(arguments.run, arguments.folder, **more)
-    tell(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
+    scene = quote(str(path.with_name(path.stem + "_paraview.py")))
+    tell(f"open {path} in ParaView, or a ready scene: paraview --state={scene}")
     alone = path.with_stem(f"{path.stem}_filaments")
     if alone.exists():
         tell(f"for filters of lines, such as Tube: {alone}, of the filaments alone")
