@@ -91,6 +91,11 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    """The public names."""
+    return __all__
+
+
 def __getattr__(name: str) -> Any:
     """Import the module of a public name when the name is first used."""
     if name not in _HOME:

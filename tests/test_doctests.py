@@ -42,6 +42,7 @@ def test_examples_in_docstrings_run(name, folder, monkeypatch):
 
 
 def test_every_public_name_says_what_it_is():
+    assert dir(ibfil) == sorted(ibfil.__all__)
     for name in ibfil.__all__:
         value = getattr(ibfil, name)
         assert name == "__version__" or len(inspect.getdoc(value) or "") > 40, name

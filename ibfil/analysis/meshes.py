@@ -132,6 +132,25 @@ def polylines(
     return _poly_data(np.concatenate(points), lengths, arrays, snapshot.time)
 
 
+def wall_plane(run: RunFile) -> vtkDataSet | None:
+    """The wall as a rectangle, wider than the rods' way over the run by as much on each side; None where none is."""
+    height = fluid_model(run.case).wall
+    if height is None:
+        return None
+    from vtkmodules.vtkFiltersSources import vtkPlaneSource
+
+    paths = [np.asarray(columns["position"])[:, :, :2].reshape(-1, 2) for columns in run.filaments.values()]
+    low, high = np.min([p.min(axis=0) for p in paths], axis=0), np.max([p.max(axis=0) for p in paths], axis=0)
+    wide = max(float(np.max(high - low)), *(filament.length for filament in run.case.filaments.values()))
+    (x, y), (far_x, far_y) = low - wide, high + wide
+    plane = vtkPlaneSource()
+    plane.SetOrigin(x, y, height)
+    plane.SetPoint1(far_x, y, height)
+    plane.SetPoint2(x, far_y, height)
+    plane.Update()
+    return plane.GetOutput()
+
+
 def link_lines(snapshot: Snapshot) -> vtkDataSet:
     """All links at one time as vtkPolyData: a line an element, from point to point, where they are unwrapped.
 

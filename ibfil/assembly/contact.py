@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..case.schema import Case
 
 
+CROSSED = 1e-6  # of the distance of contact: axes nearer than that lie in each other, and have no side to part to
 BUCKLING = 10.0  # A/L^2: about pi^2, the push at which a filament would rather bend
 
 
@@ -62,3 +63,33 @@ def contact(
     if given.action == "repel":
         return ContactRepels(segments, names, offsets, box, strength(case))
     return (ContactStops if given.action == "stop" else ContactWarns)(segments, names, offsets, box)
+
+
+def refuse_crossed(case: Case, touching: Contact, names: Sequence[str], r: np.ndarray) -> None:
+    """Raises CaseError where rods that are to repel each other begin (nodes r (n, 3)) with one laid through the other.
+
+    Ends may begin at one point, as where they are linked.
+    """
+    if touching.repulsion is None:
+        return
+    segments, pairs = touching.segments, touching.near(r)
+    length = np.array([np.max(segments.end[segments.rod == rod]) for rod in range(len(names))])
+
+    def place(segment: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        s = segments.begin[segment] + part * (segments.end[segment] - segments.begin[segment])
+        whole = length[segments.rod[segment]]
+        return s, (s > 1e-3 * whole) & (s < (1 - 1e-3) * whole)
+
+    (s, inside), (other, within) = place(pairs.i, pairs.a), place(pairs.j, pairs.b)
+    reach = segments.radius[pairs.i] + segments.radius[pairs.j]
+    crossed = np.nonzero(inside & within & (pairs.distance < CROSSED * reach))[0]
+    if crossed.size:
+        k = crossed[0]
+        first, second = names[segments.rod[pairs.i[k]]], names[segments.rod[pairs.j[k]]]
+        raise CaseError(
+            [
+                f"{case.file}: filament.{first}: found laid through {second} at s = {s[k]:.3g} and {other[k]:.3g}, "
+                'with no side to part to under contact.action = "repel"; allowed: axes apart, by '
+                f"{1e-3 * reach[k]:.1g} or more, as by another position"
+            ]
+        )

@@ -147,13 +147,14 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     stretching = half(along(filaments, ranges, s, lambda f: f.stretching))
     length = min(f.length for f in filaments)
     forces, names = loads(filaments, nodes, s, mesh, positions), tuple(p.name for p in placed)
+    r, e1 = stacked.whole(positions), stacked.whole([p.e1 for p in placed])
     touching: Contact | NoContact = NoContact()
     if case.contact is not None:
-        from .contact import contact
+        from .contact import contact, refuse_crossed
 
         touching = contact(case, names, filaments, nodes, s)
+        refuse_crossed(case, touching, names, r)
         forces += touching.loads()
-    r, e1 = stacked.whole(positions), stacked.whole([p.e1 for p in placed])
     joined: list[Link] = []
     if case.links:
         from .links import Held, links

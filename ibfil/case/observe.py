@@ -102,6 +102,7 @@ class Observe(Table):
         "velocity, displacement, speed, drift and diffusion_ratio, the whole filament for radius, force, torque and "
         "power",
     )
+    part: Literal["all", "flow", "slip", "spin", "couple"] = Field("all", description="dissipation: which part of it")
     along: Vector | None = Field(None, description="component or axis, where the kind has one")
     space: Literal["none", "mean", "max", "min"] = Field("none", description="over the window")
     over: Range | None = Field(None, description="time window; absent: the whole run")
@@ -130,6 +131,11 @@ class Observe(Table):
     def series(self) -> str:
         """The quantity whose series is kept, where the observable itself is a number fitted to that; "" else."""
         return _FITTED_TO.get(self.kind, "")
+
+    @property
+    def heat(self) -> str:
+        """The name of the series of diagnostics that has the power turned into heat, or the part of it."""
+        return "dissipation" if self.part == "all" else f"{self.part}_dissipation"
 
     def recorded(self, name: str) -> str:
         """The name of the series of an observable called ``name``: of a drift U it is U.position."""

@@ -55,6 +55,8 @@ def shortest_wave(filament: Filament, end: float) -> float:
             continue
         for time in (0.0, 0.5 * end, end):
             values = np.broadcast_to(expression.bind("s", "t")(s, time), s.shape)
+            if not np.isfinite(values).all():
+                continue  # told where a run meets it
             above = values - np.mean(values)
             above = np.sign(np.where(np.abs(above) > 1e-9 * np.max(np.abs(values)), above, 0.0))
             seen = np.flatnonzero(above)

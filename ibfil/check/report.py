@@ -168,8 +168,12 @@ def _costs(simulation: Simulation) -> list[str]:
     seconds = methods[simulation.method]
     fewest, steps = foretold_steps(simulation)
     may = "" if fluid.steps_known or not case.time.automatic else "at least "  # see step_lines
-    count, most = (f"{steps}", "") if fewest == steps else (f"{fewest} to {steps}", " at most")
-    total = f"{may}about {count} steps, {steps * seconds:.2g} s{most} after start-up"
+    total = f"{may}about {steps} steps, {steps * seconds:.2g} s after start-up"
+    if fewest != steps:
+        total = (
+            f"{may}about {fewest} to {steps} steps, {fewest * seconds:.2g} to {steps * seconds:.2g} s after start-up, "
+            "nearer the former the sooner rods settle"
+        )
     if case.time.tolerance is not None:
         total = f"as many steps as time.tolerance asks for, about {seconds:.2g} s each after start-up"
     lines.append(f"{total}, from counts (within a factor 3)")

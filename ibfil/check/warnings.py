@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 NODES_A_WAVE = 8  # wavelength/ds below which nodes do not resolve a wave: at 5.3 a swimmer is 2 % off, at 2.7 20 times
 SLOWED, DAMPED = 0.02, 0.2  # by which steps may change omega, and the decay, of a rod's own oscillation
 FLUCTUATION = 0.05  # mean square of a thermal angle between nodes that is still small
-QUARTER_TURNS = 0.2  # the same, of angles of twist between nodes, above which some are soon a quarter turn
+HALF_TURNS = 1.0  # the same, of angles of twist between nodes, above which some are soon half a turn
 JUMP = 1e-6  # of the larger value: a difference between the ends of a closed rod that is none
+MEET = 0.1  # of a segment: ends that are as near are taken to be one place
 STRAINED = 1e-6  # of the length of a filament: strain of a link at the start that is none
 STIFF = 1e6  # stiffness of a link times the step over the drag of a node: beyond it Krylov's forces drift
 RINGS, EXPLODES = 0.1, 0.3  # kT a node in ringing motions: variances are off by so much; runs explode sooner or later
@@ -47,8 +48,7 @@ def warnings(simulation: Simulation) -> list[str]:
         out += _of_inertia(simulation, name, filament)
         where = simulation.nodes(name)
         out += initial.stretch_warning(simulation.arclength[where], simulation.start.r[where], key)
-        if filament.closed:
-            out += _of_closed(key, filament, case)
+        out += _of_closed(key, filament, case) if filament.closed else _of_open(key, simulation.start.r[where])
     return (
         out
         + of_given_motion(case)
@@ -81,6 +81,13 @@ def _of_given_step(simulation: Simulation) -> list[str]:
         steps.OWN: simulation.growth_rate(),
     }
     return [steps.too_long(dt, what, rate) for what, rate in rates.items() if steps.is_long(dt, rate)]
+
+
+def _of_open(key: str, r: np.ndarray) -> list[str]:
+    """Ends that meet, of a filament that is not said to be closed."""
+    if np.linalg.norm(r[-1] - r[0]) > MEET * np.linalg.norm(r[1] - r[0]):
+        return []
+    return [f"{key}.closed: its ends meet, and know nothing of each other; meant to be closed? closed = true"]
 
 
 def _of_closed(key: str, filament: Filament, case: Case) -> list[str]:
@@ -186,11 +193,7 @@ def _softness(key: str, filament, energy: float) -> list[str]:
             out.append(
                 f"{key}.{kind}: segments turn by {np.sqrt(value):.2g} (rms) against their neighbours: "
                 f"{value / FLUCTUATION:.2g} times that modulus, or {enough} nodes"
-                + (
-                    "; as it is, some are soon a quarter turn apart, which stops the run"
-                    if value > QUARTER_TURNS
-                    else ""
-                )
+                + ("; as it is, some are soon half a turn apart, which stops the run" if value > HALF_TURNS else "")
             )
     return out
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError
@@ -84,7 +85,8 @@ def _end(result: Result, changes: str = "") -> int:
         told = digest(run)
     reason = f" ({told['reason']})" if told["reason"] else ""
     tell(f"{told['status']}{reason}: {told['steps']} steps in {duration(told['wall_time'])}")
-    longer = f" (longer: ibfil run --resume {result.path} time.end=...)" if told["status"] == "finished" else ""
+    again = f" (longer: ibfil run --resume {quote(str(result.path))} time.end=...)"
+    longer = again if told["status"] == "finished" else ""
     tell(f"{result.path}: {told['outputs']} outputs{longer}")
     tell(results(told, changes))
     return DONE

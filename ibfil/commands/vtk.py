@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from shlex import quote
 from typing import Any
 
 from ..errors import CaseError
@@ -40,7 +41,8 @@ def do(arguments: argparse.Namespace) -> int:
 
     more |= {"watch": arguments.watch, "log": tell}
     path = write_vtk(arguments.run, arguments.folder, **more)
-    tell(f"open {path} in ParaView, or a ready scene: paraview --state={path.with_name(path.stem + '_paraview.py')}")
+    scene = quote(str(path.with_name(path.stem + "_paraview.py")))
+    tell(f"open {path} in ParaView, or a ready scene: paraview --state={scene}")
     alone = path.with_stem(f"{path.stem}_filaments")
     if alone.exists():
         tell(f"for filters of lines, such as Tube: {alone}, of the filaments alone")

@@ -62,6 +62,13 @@ class Immersed:
         """The self-mobility (n, c) of each node beyond the grid's response."""
         return self.coupling.own(self.slip)
 
+    @cached_property
+    def units(self) -> np.ndarray | None:
+        """The units (c n,) of motions: a turn counts as what it moves at a cell's distance; None: all are moves."""
+        own = np.ones_like(self.own)
+        own[:, 3:] = 1.0 / self.space.spacing
+        return own.ravel() if own.shape[1] > 3 else None
+
     def stencil(self, r: np.ndarray) -> Stencil:
         """First grid index (n, 3) and weights (n, 3, P) of the nodes r (n, 3)."""
         return self.space.stencil(self.kernel, r)
@@ -81,6 +88,10 @@ class Immersed:
         if self.spin_drag is None or self.twists is None:
             return self.coupling.advected(self.flow, r, nodes.axes, time, self.space.spacing)
         return advected(self.flow, r, self.twists[:, None] * nodes.axes, time, self.space.spacing)
+
+    def carried(self, r: np.ndarray, e3: np.ndarray, time: float) -> np.ndarray | None:
+        """The motions (n, c) or (n, m) with which the background flow carries all that pushes the fluid."""
+        return self.advected(self.nodes(r, e3), r, time)
 
     def mobility(self, alpha: float = 0.0) -> Mobility:
         """The exact mobility of nodes, without their own; alpha is density over time, zero in Stokes flow."""

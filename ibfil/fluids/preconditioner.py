@@ -108,11 +108,12 @@ class Asked(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """The exact mobility of nodes: ``of`` (nodes, own), what each node moves by itself (n, c), and c."""
+    """The exact mobility of nodes: ``of`` (nodes, own), what each moves alone (n, c), c, and units of motions."""
 
     of: Callable[[Nodes, np.ndarray], np.ndarray]
     own: np.ndarray
     parts: int
+    units: np.ndarray | None  # (c n,); None: all are one
 
     def factored(self, nodes: Nodes, tau: float, rods: RodStiffness, groups: tuple[Group, ...]) -> Blocks:
         """The factors of the systems of groups of filaments, each by itself."""
@@ -121,7 +122,7 @@ class Matrix(NamedTuple):
             at = nodes_of(group)
             matrix = self.of(nodes[at], self.own[at])
             parts.append(((c * at[:, None] + np.arange(c)).ravel(), rods.system(group, matrix, tau)))
-        return gmres.factored(parts, rods.held)
+        return gmres.factored(parts, rods.held, self.units)
 
 
 class Preconditioner(Protocol):
@@ -153,7 +154,8 @@ class WholeMatrix:
         if self._known is None or self._known[0] is not rods.stiffness:
             n = len(asked.nodes.axes)
             system = rods.system((slice(0, n),), self.mobility, asked.tau)
-            self._known = rods.stiffness, gmres.factored([(np.arange(self._matrix.parts * n), system)], rods.held)
+            every = np.arange(self._matrix.parts * n)
+            self._known = rods.stiffness, gmres.factored([(every, system)], rods.held, self._matrix.units)
         return _checked(gmres.solve(asked.product, right, self._known[1], _EXACT, _MOST))
 
 

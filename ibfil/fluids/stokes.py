@@ -110,7 +110,7 @@ class DenseResponse(ImmersedResponse):
         rods = statement.frozen()
         if self._factors is None or self._factors[0] is not rods.stiffness:
             system = rods.system((slice(0, len(self.nodes.axes)),), self.matrix, self.tau)
-            self._factors = rods.stiffness, gmres.factor(system)
+            self._factors = rods.stiffness, gmres.factor(system, self.immersed.units)
         return self._factors[1].solve(right)
 
 
@@ -231,7 +231,7 @@ class StokesByFFT(Tabulated):
 
     def _exact(self) -> Matrix:
         """The exact matrices of nodes."""
-        return Matrix(self.matrix, self.immersed.own, self.immersed.coupling.components)
+        return Matrix(self.matrix, self.immersed.own, self.immersed.coupling.components, self.immersed.units)
 
 
 class StokesByKrylov(StokesByFFT):

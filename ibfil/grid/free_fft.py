@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 from scipy.fft import dct, dst
 
-from .fft import VectorTransform
 from .free_space import ODD, PARTS, response
+from .padded_fft import PaddedTransform
 from .spreading import interpolate, spread
 
 ROOM = 4  # extents are rounded up to this, so that plans serve while the nodes move
@@ -62,7 +62,7 @@ class FreeSolve:
 
     def _prepare(self, cells: tuple[int, int, int]) -> None:
         parts = PARTS[self._vectors]
-        self.transform = VectorTransform(cells, self._threads, fields=3 * self._vectors)
+        self.transform = PaddedTransform(cells, self._threads, fields=3 * self._vectors)
         scales = np.repeat(self._scales, (6, 3, 6))[:parts] / self.transform.size
         self._symbols = symbols(parts, cells) * scales[:, None, None, None]
         if self._vectors == 1:  # real, and complex modes are seen as pairs of reals

@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 from scipy.fft import dct, fft
 
-from .fft import VectorTransform
 from .free_fft import FreeSolve, padded, sines, symbols
+from .padded_fft import PaddedTransform
 from .spreading import Stencil, interpolate, mirrored, spread
 from .wall_tables import ODD, images
 
@@ -45,12 +45,13 @@ class WallSolve:
         self.cells: tuple[int, int, int] = (0, 0, 0)
 
     def _prepare(self, cells: tuple[int, int, int]) -> None:
-        self.transform = VectorTransform(cells, self._threads, fields=6)
+        self.transform = PaddedTransform(cells, self._threads, fields=6)
         scale = self._scale / self.transform.size
         mz, my, mx = cells
         free = np.moveaxis(symbols(6, (mx, my, mz)), 3, 1)  # (part, z, x, y)
-        self._free = np.ascontiguousarray(np.swapaxes(free, 2, 3)) * scale
-        self._images = image_symbols(cells) * scale
+        # Parts are last: they are read together.
+        self._free = np.ascontiguousarray(np.moveaxis(np.swapaxes(free, 2, 3) * scale, 0, 3))
+        self._images = np.ascontiguousarray(np.moveaxis(image_symbols(cells) * scale, 0, 3))
         self.cells = cells
 
     def velocity(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -77,7 +78,7 @@ class WallSolve:
         _convolve(self.transform.modes, self._free, self._images)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})
 def _reflect(t, sx, sy, f, g):
     """P and Q less G f, of the modes f, g of forces at -k_z; t (11,) are symbols, sx and sy the signs of k_x, k_y."""
     x, y, z = f
@@ -93,7 +94,7 @@ def _reflect(t, sx, sy, f, g):
     return p, q
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def _convolve(f, free, images):
     nz, ny, nx = f.shape[1:]
     for i in range(nz // 2 + 1):
@@ -106,7 +107,7 @@ def _convolve(f, free, images):
                     (f[0, other, j, k], f[1, other, j, k], f[2, other, j, k]),
                     (f[3, other, j, k], f[4, other, j, k], f[5, other, j, k]),
                 )
-                t, g = images[:, i, row, k], free[:, i, row, k]
+                t, g = images[i, row, k], free[i, row, k]
                 for up in (True, False):
                     at, sz = (i, 1.0) if up else (other, -1.0)
                     source, own = (there[0], here[0]) if up else (here[0], there[0])

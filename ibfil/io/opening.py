@@ -8,6 +8,7 @@ import re
 import stat
 import time as clock
 from pathlib import Path
+from shlex import quote
 from typing import NamedTuple
 
 import h5py
@@ -120,7 +121,7 @@ def _no_run(path: Path) -> RunFileError:
         return RunFileError(damaged(path))
     found = "is not a run file of ibfil"
     if re.search(rb"^\s*\[(fluid|time|output|filament\.[^\n]*)\]", head, re.MULTILINE):
-        found = f"is a case, not a run file; `ibfil run {path}` makes one of it"
+        found = f"is a case, not a run file; `ibfil run {quote(str(path))}` makes one of it"
     return RunFileError(f"{path}: {found}")
 
 
@@ -137,5 +138,5 @@ def damaged(path: Path) -> str:
     """The error for a file that cannot be read."""
     line = f"{path}: is damaged or cut short"
     if checkpoint_path(path).exists():
-        line += f"; `ibfil run --resume {path}` rebuilds it"
+        line += f"; `ibfil run --resume {quote(str(path))}` rebuilds it"
     return line

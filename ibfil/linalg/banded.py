@@ -127,9 +127,14 @@ def solve(matrix: np.ndarray, right: np.ndarray, where: Profile) -> np.ndarray:
 
 
 def solve_pivoted(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The same by LAPACK, with pivoting. Raises numpy.linalg.LinAlgError where the matrix is singular."""
+    """The same by LAPACK, with pivoting; no numbers where the matrix or ``right`` has some that are none.
+
+    Raises numpy.linalg.LinAlgError where the matrix is singular.
+    """
     upper, diagonals = lapack_form(matrix)
-    return solve_banded((upper, upper), diagonals, right.ravel()).reshape(right.shape)
+    if not (np.isfinite(diagonals).all() and np.isfinite(right).all()):
+        return np.full(right.shape, np.nan)
+    return solve_banded((upper, upper), diagonals, right.ravel(), check_finite=False).reshape(right.shape)
 
 
 def lapack_form(matrix: np.ndarray) -> tuple[int, np.ndarray]:

@@ -22,32 +22,36 @@ Product = Callable[[np.ndarray], np.ndarray]
 
 
 class Factors(NamedTuple):
-    """LU factors, with pivots, of a system."""
+    """LU factors, with pivots, of a system whose rows were divided by their units."""
 
     lu: np.ndarray
     pivots: np.ndarray
+    units: np.ndarray | None  # (n,); None: all are one
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """x with system x = right."""
-        return dgetrs(self.lu, self.pivots, right)[0]
+        return dgetrs(self.lu, self.pivots, right if self.units is None else right / self.units)[0]
 
 
-def factor(transposed: np.ndarray) -> Factors:
+def factor(transposed: np.ndarray, units: np.ndarray | None = None) -> Factors:
     """The factors of a system (n, n) from its transpose, which is overwritten: LAPACK takes rows for columns.
 
-    Raises numpy.linalg.LinAlgError where it is singular.
+    ``units`` (n,) are those of the rows: pivots are chosen among numbers that may be compared, whatever the units of
+    a case. Raises numpy.linalg.LinAlgError where it is singular.
     """
+    if units is not None:
+        transposed /= units
     lu, pivots, fault = dgetrf(transposed.T, overwrite_a=True)
     if fault:
         raise np.linalg.LinAlgError("Singular matrix")
-    return Factors(lu, pivots)
+    return Factors(lu, pivots, units)
 
 
 class Blocks(NamedTuple):
     """A preconditioner: LU factors of the system's diagonal block for each set of unknowns, and their scale.
 
-    ``scale`` (n,) are the units that solutions are measured in: one for a move, and for the force that holds an
-    unknown the force that would move it by one.
+    ``scale`` (n,) are the units that solutions are measured in: those of moves, and for the force that holds an unknown
+    the force that would move it by one of them.
     """
 
     factors: list[tuple[np.ndarray, Factors]]
@@ -61,14 +65,17 @@ class Blocks(NamedTuple):
         return out
 
 
-def factored(parts: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> Blocks:
-    """The factors of square blocks, by the unknowns (k,) each stands for, given transposed; overwrites them."""
+def factored(parts: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray, units: np.ndarray | None = None) -> Blocks:
+    """The factors of square blocks, by the unknowns (k,) each stands for, given transposed; overwrites them.
+
+    ``units`` (n,) are those of moves; None: one.
+    """
     diagonal = np.empty(sum(len(at) for at, _ in parts))
     for at, system in parts:
         diagonal[at] = np.diag(system)
-    scale = np.ones(len(diagonal))
-    scale[held] = 1.0 / diagonal[held]
-    return Blocks([(at, factor(system)) for at, system in parts], scale)
+    scale = np.ones(len(diagonal)) if units is None else units.copy()
+    scale[held] /= diagonal[held]
+    return Blocks([(at, factor(system, None if units is None else units[at])) for at, system in parts], scale)
 
 
 class GmresResult(NamedTuple):

@@ -16,19 +16,29 @@ if TYPE_CHECKING:
 
 
 class Dissipation(ObservableBase, kind="dissipation"):
-    """Power that the fluid turns into heat, all filaments together: eta int |grad u|^2 on a grid, else F.(u - u0).
+    """Power turned into heat by the motion, all filaments together; with `part`, that part of it.
 
-    On a grid it is that of the flow alone: slip, and spins with rotation = "local", turn more into heat beside it. It
-    costs an evaluation of the fluid at each output there.
+    flow: by the flow that forces drive, eta int |grad u|^2, and in rft by the drag of velocities; slip: between nodes
+    and grid; spin: by spins about the tangent that the flow takes no part in (all of them but for rotation = "grid");
+    couple: of thick rods in a background flow. The sum is the power of the filaments, less what they do upon a
+    background flow and what sets a fluid with inertia in motion. It costs an evaluation of the fluid at each output.
     """
 
-    keys: ClassVar[tuple[str, ...]] = SUMMARY
+    keys: ClassVar[tuple[str, ...]] = ("part", *SUMMARY)
     dimension = "force length/time"
-    description = "power turned into heat by the fluid, by the motion"
+    description = "power turned into heat"
+
+    def __init__(self, case: Case, observe: Observe) -> None:
+        super().__init__(case, observe)
+        self._series = observe.heat
+
+    def details(self, observe: Observe) -> dict[str, object]:
+        """The part, by key."""
+        return {"part": observe.part} if "part" in observe.model_fields_set else {}
 
     def sample(self, snapshot: Snapshot) -> float:
-        """At one output."""
-        return float(snapshot.diagnostics["dissipation"])
+        """At one output; zero where the model has no such part."""
+        return float(snapshot.diagnostics.get(self._series, 0.0))
 
 
 class Flux(ObservableBase, kind="flux"):

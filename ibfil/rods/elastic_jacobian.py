@@ -80,14 +80,14 @@ def _flux(a, f, edge, c):
 def _twist(a, b, f):
     """f dO3 ds as it follows node ``a`` of a segment, ``b`` the other one; f is negative where a comes first.
 
-    dO3 = 1/(2 ds) { [-(e3_a.e1_b) e2_a + (e2_b.e3_a) e1_a].dr'_a/|r'_a|
-                   + [-(e2_a.e3_b) e1_b + (e3_b.e1_a) e2_b].dr'_b/|r'_b|
-                   + (e1_a.e1_b + e2_a.e2_b)(dpsi_b - dpsi_a) },     a before b
+    dO3 = 1/ds { dpsi_b - dpsi_a + [(c p + s q) e2 + (s p - c q) e1].(-+ dr'/|r'|)/(c^2 + s^2) of either },
+    c = e1.e1_b + e2.e2_b,  s = e1.e2_b - e2.e1_b,  p = e3.e1_b,  q = e3.e2_b,      b the other one
     """
-    h = 0.5 * f
-    psi = h * (dot(a.e1, b.e1) + dot(a.e2, b.e2))
-    slope = mix(h * a.short * dot(a.e3, b.e1), a.e2, -h * a.short * dot(a.e3, b.e2), a.e1)
-    return _Row((0.0, 0.0, 0.0), plus(slope, psi, a.turn), psi)
+    c, s = dot(a.e1, b.e1) + dot(a.e2, b.e2), dot(a.e1, b.e2) - dot(a.e2, b.e1)
+    p, q = dot(a.e3, b.e1), dot(a.e3, b.e2)
+    k = f * a.short / (c * c + s * s)
+    slope = mix(k * (c * p + s * q), a.e2, k * (s * p - c * q), a.e1)
+    return _Row((0.0, 0.0, 0.0), plus(slope, f, a.turn), f)
 
 
 @njit(cache=True)

@@ -1,6 +1,7 @@
 """From nodes and frames to tangents, strains and spacing: everything the forces are made of.
 
-r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 = -e2.r'', O2 = e1.r'', O3 by Eq. 39.
+r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 = -e2.r'', O2 = e1.r'', O3 = psi/ds (Eq.
+39 has its sine).
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class Configuration:
     edge = property(lambda self: self.table[:, EDGE : EDGE + 3], doc="(n, 3) d = r_{i+1} - r_i")
     metric = property(lambda self: self.table[:, METRIC], doc="(n,) |r'|")
     bend = property(lambda self: self.table[:, O1 : O2 + 1], doc="(n, 2) O1 = -e2.r'', O2 = e1.r''")
-    twist = property(lambda self: self.table[:, O3], doc="(n,) O3 at half nodes, Eq. 39")
+    twist = property(lambda self: self.table[:, O3], doc="(n,) O3 at half nodes, psi/ds")
     length = property(lambda self: self.table[:, LENGTH], doc="(n,) |d|; 1 where there is no segment")
 
 
@@ -90,14 +91,20 @@ def _measure_node(g, i, r_s, r_ss, e1):
 
 @njit(cache=True, inline="always")
 def _measure_segments(mesh, g):
-    """Writes d, |d| and O3 = (e2_i + e2_{i+1}).(e1_{i+1} - e1_i)/(2 ds) (Eq. 39) of every segment."""
+    """Writes d, |d| and O3 = psi/ds of every segment, psi the turn of e1 about the rod (Eq. 39 has its sine):
+
+    tan psi = (e2_a.e1_b - e2_b.e1_a)/(e1_a.e1_b + e2_a.e2_b)
+
+    An e1 that is carried from e3_a to e3_b without spin (Eq. 41) has psi = 0.
+    """
     for i in range(g.shape[0]):
         if mesh.joined[i]:
             edge = plus(at(g, i + 1, R), -1.0, at(g, i, R))
-            turn = plus(at(g, i + 1, E1), -1.0, at(g, i, E1))
             put(g, i, EDGE, edge)
             g[i, LENGTH] = np.sqrt(dot(edge, edge))
-            g[i, O3] = dot(plus(at(g, i, E2), 1.0, at(g, i + 1, E2)), turn) / (2.0 * mesh.ds[i])
+            e1, e2, e1_b, e2_b = at(g, i, E1), at(g, i, E2), at(g, i + 1, E1), at(g, i + 1, E2)
+            sine = dot(plus(e2, 1.0, e2_b), plus(e1_b, -1.0, e1))  # small differences keep their digits
+            g[i, O3] = np.arctan2(sine, dot(e1, e1_b) + dot(e2, e2_b)) / mesh.ds[i]
         else:
             put(g, i, EDGE, (0.0, 0.0, 0.0))
             g[i, LENGTH], g[i, O3] = 1.0, 0.0

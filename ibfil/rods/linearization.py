@@ -37,6 +37,18 @@ def force_rows(rows: np.ndarray, unknowns: int) -> np.ndarray:
     return np.concatenate([rows, np.zeros_like(rows[:, :1])], axis=1)
 
 
+def twist_slope(node: tuple[np.ndarray, ...], other: tuple[np.ndarray, ...]) -> np.ndarray:
+    """+- the derivative (k, 3) of a segment's twist by e3 of one of its nodes: + for the second, - for the first.
+
+    Frames e1, e2, e3 (k, 3) of both; the formula is in elastic_jacobian.py.
+    """
+    (e1, e2, e3), (f1, f2, _) = node, other
+    c, s, p, q = _dot(e1, f1) + _dot(e2, f2), _dot(e1, f2) - _dot(e2, f1), _dot(e3, f1), _dot(e3, f2)
+    squared = np.maximum(c * c + s * s, np.finfo(float).tiny)
+    out: np.ndarray = ((c * p + s * q) * e2 + (s * p - c * q) * e1) / squared
+    return out
+
+
 class Linearization:
     """A stiffness being filled, at the configuration ``configuration`` reached from ``start``.
 
@@ -112,23 +124,17 @@ class Linearization:
             self.matrix[nodes + shift, :, column] += rows
 
     def twist(self, half: np.ndarray, rows: np.ndarray, shift: Shift = 0) -> None:
-        """rows (k, m) times dO3 of the half nodes ``half`` (k,), each after the node of its number: Eq. 39.
-
-        2 ds dO3 = [-(e3_a.e1_b) e2_a + (e2_b.e3_a) e1_a].de3_a + [-(e2_a.e3_b) e1_b + (e3_b.e1_a) e2_b].de3_b
-                   + (e1_a.e1_b + e2_a.e2_b)(dpsi_b - dpsi_a)
-        """
+        """rows (k, m) times dO3 of the half nodes ``half`` (k,), each after the node of its number (`twist_slope`)."""
         a, b = half, half + 1
-        e1a, e2a, e3a, e1b, e2b, e3b = (
-            e[nodes] for nodes in (a, b) for e in (self.configuration.e1, self.configuration.e2, self.configuration.e3)
+        here, after = (
+            tuple(e[nodes] for e in (self.configuration.e1, self.configuration.e2, self.configuration.e3))
+            for nodes in (a, b)
         )
-        on_a = _dot(e2b, e3a) * e1a - _dot(e3a, e1b) * e2a
-        on_b = _dot(e3b, e1a) * e2b - _dot(e2a, e3b) * e1b
-        along = _dot(e1a, e1b) + _dot(e2a, e2b)
-        rows = rows / (2.0 * self.mesh.ds[half])[:, None]
-        self.tangent(a, rows[:, :, None] * (on_a - along * self._swing(a))[:, None], shift)
-        self.tangent(b, rows[:, :, None] * (on_b + along * self._swing(b))[:, None], shift - 1)
-        self._spin(a, -rows * along, shift)
-        self._spin(b, rows * along, shift - 1)
+        rows = rows / self.mesh.ds[half][:, None]
+        self.tangent(a, -rows[:, :, None] * (twist_slope(here, after) + self._swing(a))[:, None], shift)
+        self.tangent(b, rows[:, :, None] * (twist_slope(after, here) + self._swing(b))[:, None], shift - 1)
+        self._spin(a, -rows, shift)
+        self._spin(b, rows, shift - 1)
 
     def nonlocal_twist(self, unit_responses: np.ndarray, factors: np.ndarray) -> None:
         """The part of M3 that comes from the twist of the half nodes before and after, by ``factors`` (n, 2).

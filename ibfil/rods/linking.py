@@ -7,7 +7,7 @@ crossing,
     Lk(a, b) = sum_ij Omega_ij/(4 pi),      Wr(a) = sum_{i != j} Omega_ij/(4 pi)
 
 The linking number is that of the polygon of the nodes and of the one beside it along e1. It is a whole number, to
-the square root of round-off as the arcsines are. Tw = Lk - Wr; the sum of Eq. 39 is that to order ds^2 only.
+the square root of round-off as the arcsines are. Tw = Lk - Wr; the sum of O3 ds is that to order ds^2 only.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from .base import TangentReversed
 from .elastic_force import Moment
 from .frame import transport
 from .geometry import Configuration
-from .linearization import Linearization, Shift
+from .linearization import Linearization, Shift, twist_slope
 from .mesh import Mesh
 from .system import RodSystem
 
@@ -86,7 +86,8 @@ def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Configuration:
     e2 = np.cross(b.e3, e1)
     bend = np.stack([-_dot(e2, r_ss), _dot(e1, r_ss)], axis=1)
     twist = np.zeros(len(r))
-    twist[:-1] = _dot(e2[:-1] + e2[1:], e1[1:] - e1[:-1]) / (2 * mesh.ds[:-1])
+    sine, cosine = _dot(e2[:-1] + e2[1:], e1[1:] - e1[:-1]), _dot(e1[:-1], e1[1:]) + _dot(e2[:-1], e2[1:])
+    twist[:-1] = np.arctan2(sine, cosine) / mesh.ds[:-1]
     return Configuration.of(
         r=r,
         e1=e1,
@@ -259,26 +260,17 @@ class _Jacobian:
         slope[:, :3] = sign * inv[:, None, None] * self.q[1] - _outer(half, self.p[1])
         spin[:, :3] = sign * inv[:, None] * self.q[2] - half * self.p[2][:, None]
         if self.m == 4:
-            t1, t2, cc = self._twist_parts(side)
-            c = np.where(there, shift(moment.twist_slope * 0.5 / mesh.ds), 0.0)
+            e1, e2, e3 = (_next(e) if side else _before(e) for e in (g.e1, g.e2, g.e3))
+            turned = twist_slope((g.e1, g.e2, g.e3), (e1, e2, e3))
+            c = sign * np.where(there, shift(moment.twist_slope / mesh.ds), 0.0)
             lever = np.cross(b.u, _next(b.s) - b.s) / b.length[:, None]
             lever = np.column_stack([shift(lever), np.ones(n)]) * c[:, None]
-            slope += _outer(lever, t1[:, None] * g.e2 + t2[:, None] * g.e1)
-            spin += lever * cc[:, None]
+            slope += _outer(lever, turned)
+            spin += lever
         slope += _outer(spin, self.turn)
         bisector = slope @ self.across
         bisector[:, :3] += sign * (shift(self.m3) * inv)[:, None, None] * _skew(shift(b.u))
         self._spread(second, bisector, spin, side)
-
-    def _twist_parts(self, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """2 ds dO3 = (t1 e2 + t2 e1).de3 + cc dpsi of node i, for the half node on that side (elastic_jacobian.py)."""
-        g = self.g
-        shift = _next if side else _before
-        e1, e2 = shift(g.e1), shift(g.e2)
-        cc = _dot(g.e1, e1) + _dot(g.e2, e2)
-        if side:
-            return -_dot(g.e3, e1), _dot(e2, g.e3), -cc
-        return _dot(g.e3, e1), -_dot(e2, g.e3), cc
 
     def _spread(self, second, bisector, spin, side: int) -> None:
         """A flux on one side of its node into the rows of both nodes beside the segment."""

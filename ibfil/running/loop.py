@@ -6,6 +6,7 @@ import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -274,7 +275,7 @@ class Loop:
             return Interrupted(f"{line}; nothing was written")
         self._checkpoint()
         self._recorder.finish("interrupted", line, **self._attributes())
-        return Interrupted(f"{line}; go on with: ibfil run --resume {self._path}")
+        return Interrupted(f"{line}; go on with: ibfil run --resume {quote(str(self._path))}")
 
     def _failed(self, reason: str) -> None:
         """Note it in the run file, or try to."""

@@ -141,7 +141,7 @@ class Diagnostics:
         return force[:, :3].sum(axis=0), torque
 
     def _dissipation(self, now: SolvedState) -> dict[str, float | np.ndarray]:
-        """The heat of the fluid, that of its couple across the rods included, and what else it knows of power."""
+        """The heat that the motion makes, its parts, that of the couple across the rods too, and other powers."""
         state, thickness = now.state, self._model.thickness
         out = self._output.dissipation(state.configuration, now.velocity, self._pushed(now), state.time)
         if thickness is None:

@@ -15,7 +15,7 @@ from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
 
 LONGEST, SHORTEST = 2.0, 0.2  # of the rest length: beyond this a segment is no rod any more
-LARGEST_TWIST = 0.95  # of sin(O3 ds): Eq. 39 stops resisting at 1
+LARGEST_TWIST = 2.8  # radians from node to node: beyond pi the twist comes back from the other side
 UNBOUNDED = "a load, a law or a flow that grows without bound, or has no value, where the rod has come to"
 
 
@@ -99,15 +99,17 @@ class OverStretched(NamedTuple):
 
 
 class OverTwisted(NamedTuple):
-    """The twist O3 ds of the segment after ``node`` is near a quarter turn; ``sine`` is that of Eq. 39."""
+    """The twist O3 ds of the segment after ``node``, an ``angle`` in radians, is near half a turn."""
 
     node: int
-    sine: float
+    angle: float
 
     def trouble(self, step: Step) -> Failure:
         """The failure, for the user."""
-        message = f"the twist between two nodes nears a quarter turn: sin = {self.sine:.3g} (allowed {LARGEST_TWIST})"
-        cause = step.cause("the rod is wound up faster than it unwinds, until Eq. 39 stops resisting")
+        message = f"the twist between two nodes nears half a turn: {self.angle:.3g} rad (allowed {LARGEST_TWIST})"
+        cause = step.cause(
+            "the rod is wound up faster than it unwinds, until nodes cannot tell the turn from its opposite"
+        )
         return Failure(message, self.node, cause, step.remedy("more nodes, a slower spin, a larger twisting"))
 
 

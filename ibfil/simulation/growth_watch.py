@@ -88,6 +88,8 @@ class GrowthWatch:
     def _leading(self, configuration: Configuration, time: float, taus: list[float]) -> Mode | None:
         """The mode that grows fastest."""
         force, inner = self._system.forces(configuration, time)
+        if not np.isfinite(force).all():
+            return None  # told where a step meets it
         matrix = self._system.stiffness(configuration, configuration, inner, time)
         held = self._system.ends.index
         begin = np.random.default_rng(0).standard_normal(force.shape)

@@ -53,10 +53,10 @@ def run_members(
     ``log`` is told a line when a member ends, with the time left; a terminal has a bar too. A run that failed for
     reasons of the scene counts as known until its case or the versions change, and is not tried again.
 
-    Raises CaseError where two members have one name or one cannot be that of a file, or the folder cannot be
-    made; Interrupted after Ctrl-C or SIGTERM, when the runs under way have written their checkpoints, and where the
-    executor broke: the same call goes on. A member whose case is at fault, fails or kills its process is an Outcome,
-    no exception.
+    Raises CaseError where two members have one name or one cannot be that of a file, the folder cannot be made, or
+    processes of a script without `if __name__ == "__main__"` would begin others; Interrupted after Ctrl-C or
+    SIGTERM, when the runs under way have written their checkpoints, and where the executor broke: the same call goes
+    on. A member whose case is at fault, fails or kills its process is an Outcome, no exception.
     """
     folder = Path(folder)
     _check_names(members)

@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import Interrupted
+from ..errors import CaseError, Interrupted
 from ..threads import set_threads
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     Work = Callable[[Member, str], Outcome]  # what is done with a member in a folder; it can be pickled
 
 _LOOK = 0.2  # seconds between two looks at signals
+_UNGUARDED = 76  # exit status of a worker whose script, read anew, would begin workers of its own
 
 
 class Worker:
@@ -43,10 +44,14 @@ class Worker:
     def begin(self, member: Member) -> None:
         """Give it something to do."""
         self.member = member
-        self.pipe.send(member)
+        with suppress(ConnectionError):  # told when it is waited for
+            self.pipe.send(member)
 
     def ended(self, cut: bool) -> Outcome:
-        """Return what it has sent; where it has died, that: interrupted if ``cut``, failed otherwise."""
+        """Return what it has sent; where it has died, that: interrupted if ``cut``, failed otherwise.
+
+        Raises CaseError where it could not begin.
+        """
         from .member import Outcome
 
         member, self.member = self.member, None
@@ -56,6 +61,9 @@ class Worker:
         except (EOFError, ConnectionError):
             self.dead = True
             self.close()
+            if self._process.exitcode == _UNGUARDED:
+                allowed = 'what runs members under `if __name__ == "__main__":`'
+                raise CaseError([f"jobs: each process reads the script anew; allowed: {allowed}"]) from None
             status = "interrupted" if cut else "failed"
             words = "its process was killed; by the system, perhaps, for want of memory"
             outcome = Outcome(member, status, self._folder / f"{member.name}.h5", words)
@@ -75,9 +83,14 @@ class Worker:
 
 
 def side_by_side(work: Work, todo: Sequence[Member], folder: Path, jobs: int) -> Iterator[Outcome]:
-    """Yield each outcome of ``work`` when it is known; after SIGINT or SIGTERM those of the runs under way, no more."""
+    """Yield each outcome of ``work`` when it is known; after SIGINT or SIGTERM those of the runs under way, no more.
+
+    Raises CaseError where workers cannot begin.
+    """
     from ..running.progress import Signals
 
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SystemExit(_UNGUARDED)  # a worker that is reading its script, of which its parent tells
     left, workers = list(reversed(todo)), [Worker(work, folder) for _ in range(jobs)]
     with Signals() as signals:
         try:
@@ -96,6 +109,10 @@ def side_by_side(work: Work, todo: Sequence[Member], folder: Path, jobs: int) ->
                 if signals.caught:
                     for worker in workers:
                         worker.interrupt()
+        except CaseError:
+            for worker in workers:
+                worker.member = None  # they read their script, and end by themselves
+            raise
         finally:
             for worker in workers:
                 worker.interrupt()

@@ -24,6 +24,7 @@ class Propagator(Protocol):
 VECTORS = 24  # of Arnoldi's iteration
 CERTAIN = 0.05  # relative error of an eigenvalue that counts
 LEAST = 1e-3  # of 1/tau: growth below it is none
+FAINTEST = 1e-6  # eigenvalue of the step below which it is rounding: growth of so many times 1/tau is another tau's
 
 
 class Mode(NamedTuple):
@@ -46,6 +47,7 @@ def growing(step: Propagator, begin: np.ndarray, tau: float) -> Mode | None:
         rates = (1.0 - 1.0 / values) / tau
     # lambda = (1 - 1/mu)/tau: an error of mu is one of mu (mu - 1) in lambda, relative to it.
     good = (errors < CERTAIN * np.abs(values * (values - 1.0))) & (rates.real * tau > LEAST)
+    good &= np.abs(values) > FAINTEST
     if not good.any():
         return None
     best = int(np.argmax(np.where(good, rates.real, -np.inf)))

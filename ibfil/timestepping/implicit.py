@@ -55,6 +55,15 @@ class _Equation(NamedTuple):
         answer = self.response.implicit(force, matrix, held, y, self.target, ERROR)
         return answer, _size(answer.move, self.system.length)
 
+    def valueless(self, configuration: Configuration, otherwise: int) -> int:
+        """The first node at which a force, or else the flow, has no value: a correction then has none anywhere."""
+        force, _ = self.system.forces(configuration, self.time)
+        for values in (force, self.response.forced(np.zeros_like(force), self.held, self.target).move):
+            bad = np.nonzero(~np.isfinite(values).all(axis=1))[0]
+            if 0 < len(bad) < len(values):
+                return int(bad[0])
+        return otherwise
+
 
 def _stride(move: np.ndarray, configuration: Configuration) -> float:
     """The largest change of a segment, relative to its length."""
@@ -184,4 +193,5 @@ class Implicit:
         still = f"Newton's correction is still {size:.2g} of the length (allowed {self.tolerance:g})"
         if not np.isfinite(size):
             still = "the run diverged: a correction is no finite number"
+            worst = equation.valueless(configuration, worst)
         raise NotConverged(f"{still} after {count} iterations", worst)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..assembly.fluids.models import fluid_model
 from ..io.overwriting import replacing
 
 if TYPE_CHECKING:
@@ -61,6 +62,13 @@ tubes.NumberofSides = 16
 shown = Show(tubes, view)
 ColorBy(shown, ("POINTS", "tension"))
 bar(tubes, shown, {tension!r}, 0.05)
+"""
+_WALL = """
+wall = XMLPolyDataReader(registrationName="wall", FileName=[os.path.join(FOLDER, {wall!r})])
+below = Show(wall, view)
+ColorBy(below, None)
+below.AmbientColor = below.DiffuseColor = [0.69, 0.66, 0.6]
+below.Opacity, below.Representation = 0.5, "Surface With Edges"
 """
 _LINKS = """
 links = ExtractBlock(registrationName="links", Input=run, Selectors=["/Root/Block1"])
@@ -145,6 +153,8 @@ def write_scene(collection: Path, run: RunFile) -> Path:
     time = "time {time:.6g}" + ("" if units.time == "1" else f" {units.time}")
     text = _HEAD.format(**words) + rods
     text += _RODS.format(tension=_labelled("tension", units.force))
+    if fluid_model(run.case).wall is not None:
+        text += _WALL.format(wall=f"{collection.stem}_wall.vtp")
     if run.links:
         text += _LINKS.format(link=_labelled("force of links", units.force))
     if run.bodies:

@@ -1,8 +1,8 @@
 """A run as ParaView files.
 
 One .pvd collection with the real times, a .vtp of all filaments for each output and one of all links where there are
-any, a .vti for each grid field time, where there are several of these a .pvd of each alone, and a ready scene
-(paraview_scene.py).
+any, a .vti for each grid field time, where there are several of these a .pvd of each alone, a .vtp of a wall, and a
+ready scene (paraview_scene.py).
 
 Written with vtk's own XML writers (appended raw data, 64-bit header, no compressor), which are imported when the first
 file is written: a run never loads them. A step's file is complete before the collection names it, files that would not
@@ -25,7 +25,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..analysis.body_meshes import body_surfaces
-from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of
+from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of, wall_plane
 from ..errors import CaseError
 from ..io.overwriting import VTK, refuse, replacing
 from ..io.reader import RunFile
@@ -99,6 +99,9 @@ class Collection:
             if len(there) > 1:  # each kind alone too: filters of lines, such as Tube, may crash ParaView upon a grid
                 for name, entries in there.items():
                     _write_collection(self._alone(name), [entries])
+            wall = wall_plane(run)
+            if wall is not None:
+                _save(wall, self._alone("wall").with_suffix(".vtp"))
             write_scene(self.path, run)
             return run.status == "running"
 

@@ -38,6 +38,13 @@ def test_in_resistive_force_theory():
     assert "Re = rho omega L^2/eta" not in rft
 
 
+def test_a_stream_has_a_reynolds_number_of_its_own():
+    stream = {"model": "navier-stokes", "density": 1.3, "flow": [0, 3, 4], **GRID}
+    name = "Re = rho U L/eta, U the fastest of fluid.flow"
+    assert found(WAVE, stream)[name] == pytest.approx(1.3 * 5 * 2 / VISCOSITY)
+    assert name not in found(WAVE, {"model": "navier-stokes", "density": 1.3, **GRID})
+
+
 def test_on_a_grid():
     inertia = found(WAVE, {"model": "navier-stokes", "density": 1.3, **GRID})
     h = 6.0 / 48

@@ -37,6 +37,19 @@ def test_as_many_steps_are_foretold_as_are_taken(keys):
     )
 
 
+def test_fibres_that_settle_take_few_of_the_steps_that_are_foretold_at_most():
+    """Four of the 64 that sink for ten units of time: 9960 steps were taken where some hundred do."""
+    keys = ["length=1.0", "nodes=11", "bending=1", "stretching=1e3", "loads.weight=[0, 0, -1]"]
+    keys += ["copies={count=4, seed=1, region=[[-1, -1, -1], [1, 1, 1]]}"]
+    sinking = "\n".join(f"{key}" for key in keys)
+    text = f"[filament.f]\n{sinking}\n[fluid]\nmodel = 'rft'\nviscosity = 1\n[time]\nend = 10\n[output]\nevery = 0.25"
+    case = parse_case(text.replace("copies={", "copies = {"), "sinking.toml")
+    fewest, most = foretold_steps(Simulation(case))
+    taken = run(case, build=real, progress=False, log=len).steps
+    assert most > 9000
+    assert fewest <= taken < 5 * fewest
+
+
 @pytest.mark.parametrize(
     "table",
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from helpers.scenes import RFT, scene
 
 from ibfil import parse_case
 from ibfil.check.report import report
@@ -114,3 +115,11 @@ mass = 10.0
     assert "inertia" not in whole.split("not modelled:")[1].split("dimensionless")[0]
     light = report(parse_case(SCENE, "s.toml", ["fluid.model=navier-stokes", "fluid.density=1"]))
     assert "inertia of the rods beyond the fluid they displace; walls" in light
+
+
+@pytest.mark.parametrize(("turn", "told"), [(2.0, True), (1.9, False)])
+def test_ends_that_meet_ask_whether_the_filament_is_meant_to_be_closed(turn: float, told: bool) -> None:
+    arc = {"kind": "expression", "r": [f"cos({turn}*pi*s)/({turn}*pi)", f"sin({turn}*pi*s)/({turn}*pi)", "0"]}
+    rod = {"length": 1.0, "nodes": 41, "bending": 1.0, "stretching": 100.0, "shape": arc}
+    lines = warnings(Simulation(scene({"rod": rod}, RFT)))
+    assert any("filament.rod.closed: its ends meet" in line for line in lines) == told

@@ -12,6 +12,7 @@ import pytest
 from ibfil.case.reading import parse_case
 from ibfil.grid import fft
 from ibfil.grid.fft import VectorTransform
+from ibfil.grid.padded_fft import PaddedTransform
 from ibfil.running.run import run
 
 CELLS = (10, 9, 14)
@@ -241,3 +242,19 @@ def test_a_cache_that_cannot_be_replaced_is_no_fault_and_leaves_nothing_behind()
     assert file.is_dir()
     fft.learn()
     assert {p.name for p in file.parent.iterdir()} == {file.name, "fftw-wisdom.lock"}
+
+
+@pytest.mark.parametrize("cells", [(8, 12, 10), (2, 6, 4)])
+def test_a_padded_transform_is_the_whole_one_of_half_a_box(cells: tuple[int, int, int]) -> None:
+    """Forth, and back from modes that fill the whole box; twice, for what is left there from before."""
+    whole, padded = VectorTransform(cells, fields=6), PaddedTransform(cells, fields=6)
+    x, y, z = (n // 2 for n in cells)
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        whole.real[:], padded.real[:] = 0.0, 0.0
+        whole.real[:, :x, :y, :z] = padded.real[..., :z] = rng.standard_normal((6, x, y, z))
+        assert padded.forward(6) == pytest.approx(whole.forward(6), abs=1e-12)
+        whole.modes *= 1.0 + np.arange(cells[0])[:, None, None]
+        padded.modes *= 1.0 + np.arange(cells[0])[:, None, None]
+        felt = whole.backward(6)[:, :x, :y, :z]
+        assert padded.backward(6)[..., :z] == pytest.approx(felt, abs=1e-12 * np.abs(felt).max())

@@ -15,7 +15,7 @@ omega = 10 is the rate of the wave of preferred curvature, or of the clamp's spi
        map, where nothing below it fails; many cells above it survive. A wave of curvature 8/L met half a period
        late, as at large eta, has P = 128 A/L^2. EA 50, Re 10, eta 100: stretched by 80 %, 2.9 and 3.9 points off
        with 25 steps a period, 1.0 and 1.1 with 50, 0.2 and 0.3 with 100
-    t  refused, at finer steps too: the clamp winds the rod up to a quarter turn between nodes before the twist can
+    t  refused, at finer steps too: the clamp winds the rod up to half a turn between nodes before the twist can
        spread; more nodes where that is meant
     !  fails otherwise
 """
@@ -42,7 +42,7 @@ UMAX = 0.8  # of the swimmer's fastest node, omega = 10, L = 1
 PERIOD, LOOKS, FINER = 6.3, 3, 4  # radians, a multiple of 3 steps of 0.3, 0.1 and 0.03
 STRETCH, PLACE = 0.02, 0.05
 SOFT = 0.3  # of P/EA, see above
-STOPS = {"quarter turn": "t", "times its rest length": "c"}  # where both runs stop so
+STOPS = {"half a turn": "t", "times its rest length": "c"}  # where both runs stop so
 
 
 @dataclass(frozen=True)

@@ -160,11 +160,8 @@ def test_a_recorded_run_knows_its_flow(tmp_path: Path, stirs):
         middle = grid.origin + grid.spacing * (np.array([8, 6, 4]) // 2)
         assert middle == pytest.approx([0.125, 0.25, 0.25])  # the point nearest to window_at
         power = np.asarray(run.diagnostics["grid_power"])
-        assert np.array_equal(power, run.diagnostics["dissipation"])
+        assert np.array_equal(power, run.diagnostics["flow_dissipation"])
         assert np.all(power > 0)
-        # What nodes do is what the fluid and slip turn into heat, less what the background hands them.
-        force, u = (np.asarray(run.filaments["rod"][key]) for key in ("force", "velocity"))
-        assert np.all(np.isfinite(force * u))
 
 
 def test_a_field_smoothed_by_the_kernel_is_the_flow_there(tmp_path: Path):

@@ -196,7 +196,7 @@ def whirl(ratio: float, nodes: int, derivative: int, ribbon: float = 1.0) -> com
     mean = 0.5 * (1 + ribbon)
     s = np.linspace(0.0, 1.0, nodes)
     m3 = -ratio * mean * (1 - 0.5 * (s[1:] + s[:-1]))
-    turned = np.append(0.0, np.cumsum(np.arcsin(m3 / (nodes - 1))))
+    turned = np.append(0.0, np.cumsum(m3 / (nodes - 1)))
     case = cantilever(nodes, derivative, bending=[A, A * ribbon], twisting=A, radius=RADIUS)
     spin = ratio * mean / 0.01
     matrix = transverse(case, turned=turned)

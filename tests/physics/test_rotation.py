@@ -160,6 +160,20 @@ def test_the_shipped_whirling_rod_expects_its_eigenvalue():
     assert growth(shipped("whirling_stirred", STRAIGHT, "fluid.model=rft")).real < 0
 
 
+def test_with_bkp6_whirling_does_not_depend_on_the_place_in_the_cell():
+    """Growth at ratio 8: on a grid line 1.377 and between four 1.496 with peskin4; 1.505 and 1.506 with bkp6.
+
+    Onsets: 6.26 and 6.13, and 6.012 and 6.010. The radius b is each kernel's own.
+    """
+    found = {}
+    for kernel, b in (("peskin4", 1.504506), ("bkp6", 1.731824)):
+        keys = [STRAIGHT, f"fluid.kernel={kernel}", f"parameters.b={b}*h/sqrt(1.01)"]
+        places = [f"filament.rod.position=[-0.5, {offset}, {offset}]" for offset in (0, 0.025)]
+        found[kernel] = [growth(shipped("whirling_stirred", *keys, place)).real for place in places]
+    assert found["peskin4"] == pytest.approx([1.3768, 1.4958], rel=1e-3)
+    assert found["bkp6"][1] == pytest.approx(found["bkp6"][0], rel=2e-3)
+
+
 def slender(ratio: float, stirred: float) -> complex:
     """The largest growth, in A/(zeta L^4), of the local equation with ``stirred`` in place of its 1/2; Chebyshev."""
     n = 40

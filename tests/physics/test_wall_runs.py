@@ -139,7 +139,7 @@ def test_a_pulled_rod_pumps_its_force_times_its_height(tmp_path: Path):
             np.einsum("ijkc,i,j,k->c", field[tuple(slice(b, b + 4) for b in base[q])], *weights[q]) for q in range(9)
         ]
         assert run.velocity_at(points) == pytest.approx(np.array(got), abs=2e-6 * np.abs(got).max())
-        assert np.array_equal(run.diagnostics["grid_power"], run.diagnostics["dissipation"])
+        assert np.array_equal(run.diagnostics["grid_power"], run.diagnostics["flow_dissipation"])
 
 
 def test_what_is_told_of_a_wall():
@@ -189,3 +189,32 @@ def test_compared_fluids_keep_the_wall_or_do_without():
         assert ("along" in case.observe) == (wall is not None)
     with pytest.raises(CaseError, match=r"--fluids: found wall, and no fluid.wall in the case"):
         fluid_overrides("wall", parse_case(text, "t", fluid_overrides("free", walled)))
+
+
+def test_drag_that_is_matched_is_that_far_from_the_wall():
+    """Resistive-force theory knows no height: the pair is that of free space, bit for bit, and told."""
+    from ibfil.assembly.drag import matching
+
+    fluid = {**WALL, "model": "rft", "drag": {"matched": 0.5}}
+    cases = [scene({"rod": WAVING}, one) for one in (fluid, {k: v for k, v in fluid.items() if k != "wall"})]
+    near, far = (matching(case, case.filaments["rod"]) for case in cases)
+    assert near == far
+    assert near is not None
+    assert near.perp > near.par > 0
+    assert "the wall: drag is the same at any height" in report(cases[0])
+
+
+def test_a_trade_above_a_wall_has_the_order_of_its_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import csv
+
+    from ibfil.commands import main
+
+    monkeypatch.chdir(tmp_path)
+    Path("wall.toml").write_text(
+        scene({"rod": {**WAVING, "nodes": 11}}, {**WALL, "spacing": 0.1}, end=0.2, step=0.01).text
+    )
+    steps = ["0.02", "0.005"]
+    assert main.main(["trade", "wall.toml", "time.order=1", "--vary", f"time.step={','.join(steps)}", "-o", "out"]) == 0
+    with open("out/trade.csv", newline="") as file:
+        errors = {row["time.step"]: float(row["position"]) for row in csv.DictReader(file)}
+    assert np.log(errors["0.02"] / errors["0.005"]) / np.log(4) == pytest.approx(1.0, abs=0.25)

@@ -198,6 +198,21 @@ def test_check_says_what_is_looked_for():
     assert any("contact" in line for line in absent(case(crossed(0.2, 0.0), None)))
 
 
+@pytest.mark.parametrize(("apart", "refused"), [(0.0, True), (5e-5, False)])
+def test_rods_laid_through_each_other_have_no_side_to_part_to(apart: float, refused: bool) -> None:
+    """They would stay crossed, in steps as short as round-off asks for; a thousandth apart they part."""
+    scene = case(crossed(apart, 0.0), {"action": "repel", "distance": 0.05, "strength": 5.0})
+    if refused:
+        with pytest.raises(CaseError, match=r"found laid through \w+ at s = .*allowed: axes apart, by 5e-05"):
+            Simulation(scene)
+        return
+    simulation = Simulation(scene)
+    simulation.advance(0.3, lambda: None)
+    low, high = (simulation.configuration.r[simulation.nodes(name), 2] for name in simulation.rods.names)
+    middle = len(low) // 2
+    assert abs(low[middle] - high[middle]) > 0.02
+
+
 def test_a_box_too_small_for_nearest_images_is_refused():
     scene = case(crossed(0.2, 0.0), {"distance": 0.45}, GRID)
     with pytest.raises(CaseError, match=r"contact\.distance: found 0\.45; allowed: .* half of fluid\.box"):

@@ -139,3 +139,11 @@ def test_and_their_error_is_bounded_while_they_bend() -> None:
         apart = found.configuration.r - fine.configuration.r
         assert np.sqrt(np.mean(np.sum(apart**2, axis=1))) < most
     assert found.steps < 75  # 25 a bending time of 1.02
+
+
+@pytest.mark.parametrize("left", [-1e-17, -1e-9, -1e-2])
+def test_rounding_is_no_growth(left: float) -> None:
+    """A step that leaves -1e-17 of a mode has damped it; such a one was growth of 1e17/tau. -1/100 is of 101/tau."""
+    factors = np.array([[0.5, 0.3, left]])
+    found = growing(lambda y: y * factors, np.ones((1, 3)), 1.0)
+    assert found is None if abs(left) < 1e-6 else found.eigenvalue == pytest.approx(101.0)

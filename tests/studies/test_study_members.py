@@ -156,6 +156,18 @@ if __name__ == "__main__":
 """
 
 
+def test_a_script_without_a_main_guard_is_told_in_a_sentence(tmp_path):
+    """Its processes would begin others as they read it: no pages of multiprocessing, and no want of memory."""
+    unguarded = SCRIPT.replace('if __name__ == "__main__":', "if True:").replace("loop.Loop = Waiting\n", "")
+    (tmp_path / "script.py").write_text(unguarded)
+    command = [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "out"), "2"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 1
+    assert "multiprocessing" not in done.stderr
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.endswith('allowed: what runs members under `if __name__ == "__main__":`')
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_a_signal_everything_can_be_gone_on_with(tmp_path, jobs, said):
     """Of three runs those under way leave a checkpoint, the third is not begun; and all go on, to the same bits."""

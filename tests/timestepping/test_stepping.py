@@ -393,11 +393,11 @@ def test_halved_steps_are_counted_and_grow_again_and_the_output_is_still_hit() -
     assert 4 < simulation.steps < 14
 
 
-def test_a_twist_that_nears_a_quarter_turn_between_nodes_is_refused_with_its_node() -> None:
-    """Eq. 39 is sin(angle)/ds: it stops resisting there, and a rod would wind up without end."""
+def test_a_twist_that_nears_half_a_turn_between_nodes_is_refused_with_its_node() -> None:
+    """Beyond that the twist comes back from the other side, and a rod would wind up without end."""
     keys = {"length": 1.0, "nodes": 9, "bending": 1.0, "stretching": 1e3, "twisting": 1.0, "radius": 0.5}
     keys |= {"start": {"end": "clamped", "spin": 10.0}}
-    with pytest.raises(RunFailed, match="quarter turn") as caught:
+    with pytest.raises(RunFailed, match="half a turn") as caught:
         run(scene({"rod": keys}, end=10.0, step=0.01))
     assert caught.value.filament == "rod"
     assert caught.value.node == 0

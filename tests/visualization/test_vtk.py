@@ -177,6 +177,33 @@ def test_without_a_box_images_are_refused(tmp_path):
             vtk_files.write_vtk(tmp_path / "rft.h5", **more)
 
 
+STANDING = """
+filament.rod = {{ length = 1.0, nodes = 9, bending = 1.0, stretching = 100, position = [0.2, 0, 0.6] }}
+fluid = {{ model = "stokes", viscosity = 1.0, box = "free", spacing = 0.1{wall} }}
+time = {{ end = 0.02, step = 0.01 }}
+output = {{ every = 0.01 }}
+"""
+
+
+@pytest.mark.parametrize("wall", ["", ', wall = "no-slip"'], ids=["free", "wall"])
+def test_a_wall_is_a_plane_below_the_rods_and_stands_in_the_scene(tmp_path, wall):
+    """At z = 0, a length wider than their way on each side, and read by the ready scene; or there is neither."""
+    import ibfil
+
+    (tmp_path / "case.toml").write_text(STANDING.format(wall=wall))
+    ibfil.run(tmp_path / "case.toml", tmp_path / "made.h5", progress=False, log=lambda line: None)
+    pvd = vtk_files.write_vtk(tmp_path / "made.h5")
+    file, scene = pvd.with_name("made_wall.vtp"), pvd.with_name("made_paraview.py").read_text()
+    assert file.exists() == ("made_wall.vtp" in scene) == bool(wall)
+    compile(scene, "scene.py", "exec")
+    if wall:
+        with RunFile(tmp_path / "made.h5") as run:
+            way = np.asarray(run.filaments["rod"]["position"]).reshape(-1, 3)
+        low, high = way.min(axis=0), way.max(axis=0)
+        expected = [low[0] - 1, high[0] + 1, low[1] - 1, high[1] + 1, 0.0, 0.0]
+        assert pyvista.read(file).bounds == pytest.approx(expected, abs=1e-3)
+
+
 def test_q_is_positive_in_a_vortex_and_negative_in_strain():
     """Solid rotation w about z: Q = w^2; pure strain a: Q = -a^2; simple shear: 0. All linear, so exact to rounding."""
     x, y, z = np.meshgrid(*(np.linspace(0, 1, n) for n in (5, 6, 7)), indexing="ij")

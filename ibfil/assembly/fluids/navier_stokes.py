@@ -15,7 +15,7 @@ from .on_grid import GridModel
 
 if TYPE_CHECKING:
     from ...case.filament import Filament
-    from ...fluids.base import Fluid
+    from ...fluids.base import Flow, Fluid
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.output import FluidOutput
     from ...fluids.stokes import Solver, Tabulated
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .base import Scene
 
 CELLS, INERTIAL = 0.125, 0.5  # see crossing
+LOOKS = 9  # places along an axis at which the speed of a flow is looked at
 _HISTORY = "past of the fluid, as large in a checkpoint"
 _TRANSFORMS = "its transforms"
 
@@ -151,11 +152,20 @@ class NavierStokesModel(GridModel):
         return [f"advection is extrapolated: stable while the fluid crosses less than about a cell a step ({limited})"]
 
     def groups(self, filament: Filament, rate: float) -> dict[str, float]:
-        """The Reynolds number of what drives the scene, and those of the grid."""
-        out = {}
+        """The Reynolds numbers of what drives the scene, and of the background flow; and groups of the grid."""
+        out, length = {}, filament.length * self.density / self.case.fluid.viscosity
         if rate:
-            out["Re = rho omega L^2/eta"] = self.density * rate * filament.length**2 / self.case.fluid.viscosity
+            out["Re = rho omega L^2/eta"] = rate * filament.length * length
+        if self.flow is not None:
+            out["Re = rho U L/eta, U the fastest of fluid.flow"] = self._fastest(self.flow) * length
         return out | super().groups(filament, rate)
+
+    def _fastest(self, flow: Flow) -> float:
+        """The largest speed of a flow in the box, at the start, midway and at the end."""
+        axes = [np.linspace(-0.5 * side, 0.5 * side, LOOKS) for side in self.box]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        end = self.case.time.end
+        return max(float(np.max(np.linalg.norm(flow(points, time), axis=1))) for time in (0.0, 0.5 * end, end))
 
     def warnings_of(self, scene: Scene, name: str, groups: Mapping[str, float]) -> list[str]:
         """A shape from another run, whose flow is not known."""

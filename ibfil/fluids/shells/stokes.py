@@ -56,6 +56,17 @@ class ImmersedBodies(Immersed):
         rigid, felt = self.rigid(nodes, r, e3, time, len(whole)), force[:n, :c].ravel()
         return nodes, self.joined(force, rigid.pushes(rigid.rates(whole, felt), felt).reshape(-1, 3))
 
+    def carried(self, r: np.ndarray, e3: np.ndarray, time: float) -> np.ndarray | None:
+        """The motions with which the background flow carries nodes and markers."""
+        if self.flow is None:
+            return None
+        n, places = self.shells.nodes, self.shells.places(r, e3)
+        rods = self.advected(self.all_nodes(r, e3)[:n], r[:n], time)
+        assert rods is not None
+        markers = np.zeros((len(places), rods.shape[1]))
+        markers[:, :3] = self.flow(places, time)
+        return np.concatenate([rods, markers])
+
     def joined(self, force: np.ndarray, markers: np.ndarray) -> np.ndarray:
         """The forces (n + k, m) of nodes, from those of all rows (N, m), and of markers (k, 3)."""
         n = self.shells.nodes

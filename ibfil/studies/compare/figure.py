@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 # Numbers drawn against those of the first fluid, as far as there are any.
-_DRAWN = ("speed", "reaction at start", "reaction at finish", "power of the nodes", "dissipated by the fluid",
+_DRAWN = ("speed", "reaction at start", "reaction at finish", "power of the nodes", "dissipated",
           "Lighthill efficiency", "frequency (angular)")  # fmt: skip
 _NEAR_ZERO = 1e-3  # of the largest component: a ratio of such numbers says nothing
 _CERTAIN = 0.3

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from ...io.reader import RunFile
 
 
+PARTS = {
+    "of that by the flow": "flow_dissipation",
+    "of that by slip": "slip_dissipation",
+    "of that by spins": "spin_dissipation",
+    "of that across the thickness": "couple_dissipation",
+}
+
+
 @dataclass(frozen=True)
 class Window:
     """``count`` whole periods, the last of which ends at ``end``; or equal parts, and ``why`` they are no periods."""
@@ -130,26 +138,27 @@ def _frequency(times: np.ndarray, tip: np.ndarray, window: Window) -> Quantity |
 
 
 def _powers(run: RunFile, window: Window) -> dict[str, Quantity]:
-    """The dissipated power from both sides, and what is lost on the way there: by slip, and by a rod's own spin drag.
-
-    A fluid with inertia is set in motion by what it does not dissipate.
-    """
+    """The power of the nodes, and where it goes: heat with its parts, the fluid's motion, and a background flow."""
     unit = label(run.case.units, "force length/time")
     read: Callable[[str], np.ndarray] = lambda name: np.asarray(run.diagnostics[name])  # noqa: E731
     out = {"power of the nodes": quantity(_means(run.time, read("power"), window), unit)}
     if "dissipation" in run.diagnostics:
-        out["dissipated by the fluid"] = quantity(_means(run.time, read("dissipation"), window), unit)
-    if "grid_power" in run.diagnostics:
-        grid, slip = (_means(run.time, read(name), window) for name in ("grid_power", "slip_power"))
+        out["dissipated"] = quantity(_means(run.time, read("dissipation"), window), unit)
+        for words, name in PARTS.items():
+            if name in run.diagnostics and np.any(read(name) != 0.0):
+                out[words] = quantity(_means(run.time, read(name), window), unit)
+    if "grid_power" in run.diagnostics and "slip_dissipation" in run.diagnostics:
+        grid = _means(run.time, read("grid_power"), window)
         out["power upon the grid"] = quantity(grid, unit)
         if run.case.fluid.inertial:
-            moving = _means(run.time, read("grid_power") - read("dissipation"), window)
+            moving = _means(run.time, read("grid_power") - read("flow_dissipation"), window)
             out["of that into the fluid's motion"] = quantity(moving, unit)
         elif run.case.fluid.sides is not None:  # in free space they are one number
             inside = (run.time >= window.start * (1 - 1e-9)) & (read("grid_power") != 0)
-            ratio = read("dissipation")[inside] / read("grid_power")[inside] - 1
+            ratio = read("flow_dissipation")[inside] / read("grid_power")[inside] - 1
             if len(ratio):
                 out["both sides differ by, at most"] = Quantity(float(np.max(np.abs(ratio))), None, "1")
+        slip = _means(run.time, read("slip_dissipation"), window)
         out["lost between nodes and grid, a share"] = quantity(slip / (grid + slip), "1")
     return out
 
