@@ -1,4 +1,4 @@
-"""Closed rods with thermal forces: the spread of a ring's modes, the drift, and copies of nodes that stay what they are."""
+"""Closed rods with thermal forces: the spread of a ring's modes, the drift, and copies that stay what they are."""
 
 from __future__ import annotations
 
@@ -94,7 +94,10 @@ def of_modes(simulation: Simulation, state: State, dt: float) -> np.ndarray:
 
 
 def test_modes_of_a_ring_have_half_kt_each_at_any_step():
-    """Its bending energy is pi A (n^2 - 1)^2 a^2/(2 R^3) for a cos n theta (Love 1927, art. 293); polygons: second order."""
+    """Of a cos n theta the bending energy is pi A (n^2 - 1)^2 a^2/(2 R^3) (Love 1927, art. 293).
+
+    Polygons have it to second order.
+    """
     coarse, fine = (of_modes(ring(n, RFT), relaxed(n), 1.0) for n in (24, 48))
     assert np.all(coarse - 1 > 0.05)
     np.testing.assert_allclose((4 * fine - coarse) / 3, 1, atol=0.005)

@@ -9,7 +9,6 @@ from typing import Any
 from ..member import Outcome
 from .quantities import Quantity, Window
 
-
 OBSERVED = "observed: "  # what rows of the case's own observables begin with
 
 
