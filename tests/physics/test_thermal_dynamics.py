@@ -88,7 +88,7 @@ def test_the_middle_of_a_rod_in_drag_moves_as_that_of_a_beam(t):
 
 
 def test_in_the_fluid_of_a_grid_it_moves_twice_as_far():
-    """Length by h = ds = 0.025: 2.165e-4 and 1.430e-3, found before by other code; drag alone has 1.161e-4, 6.501e-4."""
+    """Length by h = ds = 0.025: 2.165e-4 and 1.430e-3, found before by other code; drag: 1.161e-4, 6.501e-4."""
     simulation = straight(81, {**BOX, "cells": [128] * 3})
     modes, rows = Modes(simulation), across_the_middle(81, simulation)
     found = [np.mean(modes.moved(rows, 400, t / 400)) for t in (1e-4, 1e-3)]

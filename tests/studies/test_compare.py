@@ -200,7 +200,7 @@ def test_where_no_run_ends_there_is_nothing_to_compare(tmp_path):
 
 
 def test_observables_of_thermal_runs_have_errors_and_fluids_the_same_random_numbers(tmp_path):
-    """With other numbers the ratio of diffusivities would scatter by a tenth; with the same it is that of mobilities."""
+    """With the same the ratio of diffusivities is that of mobilities; with others it would scatter by a tenth."""
     heat = ["thermal.energy=1e-4", "thermal.seed=3", "filament.rod.curvature=[0, 0]", "filament.rod.radius=0.05"]
     heat += ["time.end=1.2", "time.step=0.01", "output.every=0.02"]
     seen = ["observe.D={kind='diffusion', interval=0.02}", "observe.far={kind='end_to_end'}"]
