@@ -152,7 +152,7 @@ def _replace(first, last, held, y, out):
 @njit(cache=True, error_model="numpy")
 def _turned(joined, start, held, y):
     out = y.copy()
-    first = np.int64(0)  # a literal would be compiled for by itself
+    first = 0
     for i in range(y.shape[0]):
         if joined[i]:
             edge = at(start, i, EDGE)
