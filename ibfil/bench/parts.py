@@ -50,6 +50,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         pieces.inertia(precision="single", bar=None),
         pieces.table_pair("peskin4", 1.0),
         pieces.table_pair("bkp6", 4.5),
+        pieces.table_of_a_swimmer(),
         pieces.start_up(),
     ],
     "spaces": lambda: [

@@ -62,7 +62,7 @@ def test_a_part_there_is_not_is_refused():
 
 def test_json_is_json(monkeypatch, capsys):
     row = timing.Row("a", 2.0, "b", 1.0, 2.0, None)
-    for name in ("rft_step", "table_pair", "inertia", "start_up"):
+    for name in ("rft_step", "table_pair", "table_of_a_swimmer", "inertia", "start_up"):
         monkeypatch.setattr(pieces, name, lambda *_, **__: row)
     monkeypatch.setattr(pieces, "evaluations", lambda *a: [row])
     monkeypatch.setattr(pieces, "swimmers", lambda: [row])
