@@ -70,4 +70,6 @@ def _alone(filament: Filament, segmented: Segmented) -> tuple[RodSystem, Resisti
     law = laws.linear(filaments, nodes, s)
     system = rod_system(filament)(mesh, law, stretching, free, _Still(ends), [], unknowns, filament.length)
     drag = Drag(mesh.volume, mesh.volume, 1e-3 * filament.length**2 * mesh.volume)
-    return system, ResistiveForce(drag, system.profile)
+    fluid = ResistiveForce(drag, system.profile)
+    fluid.compiled = False
+    return system, fluid

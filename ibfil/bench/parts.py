@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from ..errors import CaseError
+from . import first_step as bench_first_step
 from . import linked as bench_linked
 from . import many as bench_many
 from . import pieces
@@ -50,6 +51,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         pieces.inertia(precision="single", bar=None),
         pieces.table_pair("peskin4", 1.0),
         pieces.table_pair("bkp6", 4.5),
+        pieces.table_of_a_swimmer(),
         pieces.start_up(),
     ],
     "spaces": lambda: [
@@ -59,6 +61,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         bench_spaces.wall_pairs("bkp6", 3.0),
         *bench_spaces.transforms(),
     ],
+    "start": lambda: bench_first_step.first_step(),
     "thermal": lambda: bench_thermal.steps(),
     "swimmer": lambda: pieces.swimmers(),
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],

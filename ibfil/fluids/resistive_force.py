@@ -170,13 +170,15 @@ class _Response:
     ) -> tuple[np.ndarray, np.ndarray]:
         """d and the force felt, where there is nothing but a band."""
         band, m, inverse = stiffness.band, force.shape[1], 1.0 / self.tau
-        d, felt, good = _correct(
-            *(band, self.drag, self.e3, moved, force, inverse, at, value, self._fluid.profile, (0,) * m)
-        )
-        if good:
-            return d, felt
+        if self._fluid.compiled:
+            system = band, self.drag, self.e3, moved, force, inverse, at, value
+            d, felt, good = _correct(*system, self._fluid.profile, (0,) * m)
+            if good:
+                return d, felt
+        else:
+            _add_drag(band, self.drag, self.e3, -inverse)
         right = inverse * resist(self.drag, self.e3, moved) - force
-        right.ravel()[at] = value
+        _hold(band, right, at, value)
         d = banded.solve_pivoted(band, right)
         return d, resist(self.drag, self.e3, (moved + d) * inverse)
 
@@ -187,10 +189,7 @@ class _Response:
         (band, pairs), inverse = stiffness, 1.0 / self.tau
         right = _system(band, self.drag, self.e3, moved, force, inverse)
         _hold(band, right, at, value)
-        free = np.ones(force.shape)
-        free.ravel()[at] = 0.0
-        blocks = pairs.blocks * free[pairs.rows][:, :, None]
-        d = self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))(right)
+        d = self._fluid.coupled.factored(Stiffness(band, pairs.held(at, len(band))))(right)
         return d, resist(self.drag, self.e3, (moved + d) * inverse)
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
@@ -237,6 +236,7 @@ class ResistiveForce(Memoryless):
         spacing: float = 1.0,
     ) -> None:
         self.drag, self.profile, self.flow, self.twists, self.spacing = drag, profile, flow, twists, spacing
+        self.compiled = True  # elimination; False: by LAPACK, where a few steps are not worth seconds of compiling
 
     def advected(self, r: np.ndarray, e3: np.ndarray, time: float) -> np.ndarray | None:
         """The motions (n, m) with which the background flow carries nodes; None where there is none."""
@@ -260,17 +260,17 @@ class ResistiveForce(Memoryless):
 
         Raises numpy.linalg.LinAlgError where it is singular.
         """
-        band, (rows, columns, blocks) = -stiffness.band, stiffness.pairs
+        band = -stiffness.band
         n, m = band.shape[:2]
         _add_drag(band, self.drag, e3, 1.0 / tau)
         _hold(band, np.empty((n, m)), held, np.zeros(held.size))
         if not stiffness.coupled:
             factors = banded.Factored(band)
             return LinearStep(lambda right: factors.solve(right.ravel()).reshape(n, m), self.drag, e3, held, tau)
-        free = np.ones((n, m))
-        free.ravel()[held] = 0.0
-        pairs = Pairs(rows, columns, -blocks * free[rows][:, :, None])
-        return LinearStep(self.coupled.factored(Stiffness(band, pairs)), self.drag, e3, held, tau)
+        pairs = stiffness.pairs.held(held, n)
+        return LinearStep(
+            self.coupled.factored(Stiffness(band, pairs._replace(blocks=-pairs.blocks))), self.drag, e3, held, tau
+        )
 
     def velocity_at(
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float

@@ -25,6 +25,12 @@ class Pairs(NamedTuple):
     columns: np.ndarray  # (l,)
     blocks: np.ndarray  # (l, m, m)
 
+    def held(self, at: np.ndarray, n: int) -> Pairs:
+        """The same with zero rows of the unknowns ``at`` (k,) of n nodes."""
+        free = np.ones((n, self.blocks.shape[1]))
+        free.ravel()[at] = 0.0
+        return self._replace(blocks=self.blocks * free[self.rows][:, :, None])
+
 
 @cache
 def no_pairs(m: int) -> Pairs:

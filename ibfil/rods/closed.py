@@ -48,7 +48,7 @@ class ClosedRods(RodSystem):
         """``closures`` are the first and last node of each closed rod, the last one the copy of the first."""
         super().__init__(*args)
         self.source, self.closures = source, tuple(closures)
-        self._copies = np.nonzero(source != np.arange(len(source)))[0]
+        self.copies = np.nonzero(source != np.arange(len(source)))[0]
         ends = [end for closure in closures for end in closure]
         self._held[ends] = True  # so that ``turned`` closes them
         self._fold = _Fold(source, self.profile.first, self.profile.last, self.profile.width)
@@ -80,9 +80,9 @@ class ClosedRods(RodSystem):
     def forces(self, configuration: Configuration, time: float) -> tuple[np.ndarray, Moment]:
         """Eq. 44 and the loads, those on copies with their sources."""
         force, moment = super().forces(configuration, time)
-        extra = force[self._copies]
-        force[self._copies] = 0.0
-        np.add.at(force, self.source[self._copies], extra)
+        extra = force[self.copies]
+        force[self.copies] = 0.0
+        np.add.at(force, self.source[self.copies], extra)
         return force, moment
 
     def _stiffness(

@@ -51,6 +51,7 @@ class RodSystem:
         self._held = np.zeros(len(free), bool)
         self._held[ends.index[ends.index % unknowns < 3] // unknowns] = True
         self.closures: tuple[tuple[int, int], ...] = ()  # the first and last node of closed rods (closed.py)
+        self.copies = np.zeros(0, np.int64)  # nodes that are others again: those of closed rods
         self.remembering = tuple(part for part in (law, *loads) if isinstance(part, Remembering))
 
     @property

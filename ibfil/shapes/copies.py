@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..errors import CaseError
 from .points import read_csv
@@ -28,6 +27,8 @@ def places(copies: Copies, position: tuple[float, float, float], key: str, folde
     x, y, z and a quaternion x, y, z, w; a first row of names is passed over. Turned by the quaternion, else as
     ``orientation`` says: by uniformly random rotations or not at all. Raises CaseError.
     """
+    from scipy.spatial.transform import Rotation
+
     rng = np.random.default_rng(copies.seed)
     if copies.file is None:
         assert copies.count is not None

@@ -96,7 +96,8 @@ class Trials:
             self._taken += 1
             force = self._definite.times(self._x)
             matrix = self._definite if response.keeps else self._definite.copy()
-            y = 2 * response.implicit(force, matrix, self._held, self._zero, 0.5 * kick - carried).move
+            half = response.implicit(force, matrix, self._held, self._zero, 0.5 * kick - carried).move
+            y = self._system.complete(2 * half)
             self._x = self._x + y
             yield kick, y
 

@@ -45,7 +45,7 @@ class Trapezoid:
         ).move
         there, _ = system.forces(system.move(start, 2 * half), middle)
         answer = response.implicit(0.5 * (force + there), matrix, held, half, kick)
-        y = 2 * (half + answer.move)
+        y = system.complete(2 * (half + answer.move))
         new = State(state.time + dt, system.move(start, y), y, dt, state.steps + 1)
         return Step(new, y / dt, answer.force, answer.reaction, 1, response)
 

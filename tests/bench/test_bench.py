@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from ibfil.bench import linked, many, parts, pieces, spaces, thermal, timing
+from ibfil.bench import first_step, linked, many, parts, pieces, spaces, thermal, timing
 from ibfil.commands import bench
 from ibfil.errors import CaseError
 
@@ -56,13 +56,13 @@ def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monke
 
 
 def test_a_part_there_is_not_is_refused():
-    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, spaces, thermal, swimmer"):
+    with pytest.raises(CaseError, match=r"bench: found nope; allowed: pieces, spaces, start, thermal, swimmer"):
         parts.main(parts=["pieces", "nope"])
 
 
 def test_json_is_json(monkeypatch, capsys):
     row = timing.Row("a", 2.0, "b", 1.0, 2.0, None)
-    for name in ("rft_step", "table_pair", "inertia", "start_up"):
+    for name in ("rft_step", "table_pair", "table_of_a_swimmer", "inertia", "start_up"):
         monkeypatch.setattr(pieces, name, lambda *_, **__: row)
     monkeypatch.setattr(pieces, "evaluations", lambda *a: [row])
     monkeypatch.setattr(pieces, "swimmers", lambda: [row])
@@ -75,3 +75,18 @@ def test_help_names_every_part():
     bench.add(command)
     help_text = command.format_help()
     assert all(part in help_text for part in parts.PARTS)
+
+
+def test_the_first_step_is_timed_in_processes_with_caches_of_their_own(monkeypatch):
+    asked = []
+
+    def run(words, cwd, env, **_):
+        asked.append((tuple(words[2:4]), env["NUMBA_CACHE_DIR"], env["XDG_CACHE_HOME"]))
+        assert env["NUMBA_CACHE_DIR"].startswith(cwd)
+
+    monkeypatch.setattr(first_step.subprocess, "run", run)
+    monkeypatch.setattr(first_step, "_children", iter(range(22)).__next__)
+    rows = first_step.first_step()
+    assert [row.bar for row in rows] == [1.0, 1.0, None]
+    assert [words for words, *_ in asked[:6]] == [("ibfil", "run")] * 6
+    assert len({cache for _, *caches in asked for cache in caches}) == 1

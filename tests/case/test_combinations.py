@@ -157,7 +157,6 @@ COMBINATIONS = [
         f"{ROD}.law.gradient",
         "0",
     ),
-    ([*CLOSED, *THERMAL], f"{ROD}.closed", "no thermal noise of closed"),
     ([*CLOSED, f"{ROD}.radius=0.1", "fluid.thick=true", "fluid.flow=['y', 0, 0]"], f"{ROD}.closed", "axis only"),
     # links
     (sprung("{}", LAB), "link.k.between.0", "{ filament, at }, or { point }"),

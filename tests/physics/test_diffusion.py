@@ -16,7 +16,8 @@ from ibfil.assembly import rods as assembly_rods
 from ibfil.assembly.fluids.models import fluid_model
 from ibfil.fluids.resistive_force import resist
 
-GENERIC: dict[str, Any] = {"position": [0.013, 0.027, 0.041], "direction": [1, 0.37, 0.21]}
+GENERIC: dict[str, Any] = {"position": [0.013, 0.027, 0.041], "direction": [1, 0.37, 0.21], "anchor": "centroid"}
+ROD: dict[str, Any] = {"length": 1.0, "nodes": 11, "bending": 1.0, "stretching": 300.0, **GENERIC}
 
 
 def hasimoto(box: float) -> float:
@@ -40,10 +41,15 @@ def rigid(resistance: np.ndarray, r: np.ndarray, axis: np.ndarray) -> tuple[floa
     return along, 0.5 * (float(np.trace(d)) - along)
 
 
-def on_grid(rod: dict[str, Any], box: float, cells: int, **fluid: Any) -> tuple[np.ndarray, np.ndarray]:
-    """M^-1 (3 n, 3 n) of a rod's nodes on a grid, and their places."""
-    grid = {"model": "stokes", "box": [box] * 3, "cells": [cells] * 3, "method": "table", "slip": 0.01, **fluid}
-    case = scene({"rod": rod}, grid)
+def on_grid(
+    rod: dict[str, Any], box: float | str, other: dict[str, Any] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """M^-1 (3 n, 3 n) of a rod's nodes on a grid of spacing 0.1, or of two rods', and their places."""
+    sides = (
+        {"box": [box] * 3, "cells": [round(10 * box)] * 3} if isinstance(box, float) else {"box": box, "spacing": 0.1}
+    )
+    rods = {"rod": rod} if other is None else {"rod": rod, "other": other}
+    case = scene(rods, {"model": "stokes", "method": "table", "slip": 0.01, **sides})
     stacked = assembly_rods.rods(case)
     response = fluid_model(case).build(stacked).response(stacked.start.r, stacked.start.e3, 0.0, 1.0)
     return np.linalg.inv(response.matrix), stacked.start.r
@@ -54,10 +60,9 @@ def test_a_straight_rod_diffuses_as_a_cylinder_of_its_hydrodynamic_radius():
 
     L + 2 a for the length, a = 1.1 h (peskin4). In two boxes, which agree once what a box takes off is put back.
     """
-    rod = {"length": 1.0, "nodes": 11, "bending": 1.0, "stretching": 300.0, **GENERIC}
     means = []
     for box in (3.2, 6.4):
-        resistance, r = on_grid(rod, box, round(10 * box))
+        resistance, r = on_grid(ROD, box)
         axis = (r[-1] - r[0]) / np.linalg.norm(r[-1] - r[0])
         along, across = rigid(resistance, r, axis)
         means.append((along + 2 * across) / 3 + hasimoto(box))
@@ -67,6 +72,52 @@ def test_a_straight_rod_diffuses_as_a_cylinder_of_its_hydrodynamic_radius():
     p = length / (2 * radius)
     cylinder = (np.log(p) + 0.312 + 0.565 / p - 0.1 / p**2) / (3 * np.pi * length)
     assert means[1] == pytest.approx(cylinder, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("box", "along", "across", "turning"),
+    [(3.2, 0.168624, (0.120338 + 0.119827) / 2, 0.671988), (6.4, 0.190855, 0.142587, 0.678132)],
+)
+def test_a_stiff_rod_has_the_diffusivities_that_other_code_found(box, along, across, turning):
+    """Means of both directions across; from the matrix of mobilities of 11 nodes."""
+    resistance, r = on_grid(ROD, box)
+    axis = (r[-1] - r[0]) / np.linalg.norm(r[-1] - r[0])
+    x = motions(r, r[5])
+    d = np.linalg.pinv(x.T @ resistance @ x, rcond=1e-8)
+    line, turn = d[:3, :3], d[3:, 3:]
+    found = [axis @ line @ axis, (np.trace(line) - axis @ line @ axis) / 2, np.trace(turn) / 2]
+    np.testing.assert_allclose(found, [along, across, turning], rtol=1e-5)
+
+
+def together(resistance: np.ndarray, rods: list[np.ndarray]) -> np.ndarray:
+    """D (6, 6) of the lines that two rigid straight rods move along, each turning as it likes; kT = 1."""
+    x = np.zeros((3 * sum(len(r) for r in rods), 12))
+    at = 0
+    for k, r in enumerate(rods):
+        x[at : at + 3 * len(r), 6 * k : 6 * k + 6] = motions(r, r[len(r) // 2])
+        at += 3 * len(r)
+    lines = [0, 1, 2, 6, 7, 8]
+    return np.linalg.pinv(x.T @ resistance @ x, rcond=1e-8)[np.ix_(lines, lines)]
+
+
+def test_two_parallel_rods_diffuse_together_as_rods_of_beads_do():
+    """0.3 apart: D of one, and of one with the other; along, towards each other, and across both.
+
+    In free space against beads of a node's own radius, 1.313 h; in a box of 3.2 as other code found.
+    """
+    axis, towards = np.array([1, 0.37, 0.21]), np.array([0.37, -1, 0])
+    axis, towards = axis / np.linalg.norm(axis), towards / np.linalg.norm(towards)
+    other = {**ROD, "position": (np.array(GENERIC["position"]) + 0.3 * towards).tolist()}
+
+    def found(resistance: np.ndarray, r: np.ndarray) -> np.ndarray:
+        d = together(resistance, [r[:11], r[11:]])
+        return np.array([(e @ d[:3, :3] @ e, e @ d[:3, 3:] @ e) for e in (axis, towards, np.cross(axis, towards))])
+
+    resistance, r = on_grid(ROD, "free", other)
+    np.testing.assert_allclose(found(resistance, r), found(beads(r, 0.1313), r), rtol=0.03)
+    own, both = found(*on_grid(ROD, 3.2, other)).T
+    np.testing.assert_allclose(own, [0.167527, 0.117519, 0.119414], rtol=1e-5)
+    np.testing.assert_allclose(both / own, [0.4196, 0.6739, 0.3563], rtol=2e-4)
 
 
 def helix(theta: float, nodes: int) -> dict[str, Any]:
@@ -103,7 +154,7 @@ def test_a_tight_helix_diffuses_along_its_axis_where_resistive_force_theory_says
     as the grid makes the rod (in a box of 12.8 the two are within 1.6 %).
     """
     axis, box, nodes = np.array([0, 0, 1.0]), 6.4, 101
-    resistance, r = on_grid(helix(20, nodes), box, 64)
+    resistance, r = on_grid(helix(20, nodes), box)
     drag_only = assembly_rods.rods(scene({"rod": helix(20, nodes)}, {"model": "rft", "drag": "paper"}))
     fluid = fluid_model(scene({"rod": helix(20, nodes)}, {"model": "rft", "drag": "paper"})).build(drag_only)
     unit = np.eye(3 * nodes).reshape(3 * nodes, nodes, 3)

@@ -11,6 +11,7 @@ import pytest
 from ibfil.case.reading import parse_case
 from ibfil.commands import main
 from ibfil.errors import CaseError, RunFailed
+from ibfil.simulation.simulation import Simulation
 from ibfil.studies.compare.fluids import fluid_overrides, known_fluids
 from ibfil.studies.compare.quantities import Window, quantities, quantity
 from ibfil.studies.compare.study import choose_window, compare
@@ -196,3 +197,24 @@ def test_where_no_run_ends_there_is_nothing_to_compare(tmp_path):
     wild = ["time.scheme=explicit", "time.step=0.01", "filament.rod.stretching=1e7"]
     with pytest.raises(RunFailed, match="no fluid's run came to an end"):
         compare(SWIMMER, ("rft", "stokes"), tmp_path, wild, log=lambda line: None)
+
+
+def test_observables_of_thermal_runs_have_errors_and_fluids_the_same_random_numbers(tmp_path):
+    """With the same the ratio of diffusivities is that of mobilities; with others it would scatter by a tenth."""
+    heat = ["thermal.energy=1e-4", "thermal.seed=3", "filament.rod.curvature=[0, 0]", "filament.rod.radius=0.05"]
+    heat += ["time.end=1.2", "time.step=0.01", "output.every=0.02"]
+    seen = ["observe.D={kind='diffusion', interval=0.02}", "observe.far={kind='end_to_end'}"]
+    found = compare(SWIMMER, ("rft", "slender"), tmp_path, [*heat, *seen], log=lambda line: None)
+    one, other = (column.numbers["observed: D"] for column in found.columns)
+    assert 0.05 < one.error / one.value < 0.25
+    assert found.columns[0].numbers["observed: far"].error is None  # the last one, not a mean
+    case = parse_case(SWIMMER, "s", [*heat, "fluid.model=rft"])
+    drags = [
+        Simulation(parse_case(SWIMMER, "s", [*heat, *fluid_overrides(name, case)])).fluid.drag
+        for name in ("rft", "slender")
+    ]
+    mean = [np.mean(2 / drag.perp + 1 / drag.par) for drag in drags]
+    assert mean[1] / mean[0] < 0.9
+    assert other.value / one.value == pytest.approx(mean[1] / mean[0], rel=0.02)
+    row = next(row for row in csv.DictReader((tmp_path / "compare.csv").open()) if row["quantity"] == "observed: D")
+    assert float(row["rft +-"]) == one.error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.thermal_scenes import BENT, ROD, SPIN, USUAL, many, walk
+from helpers.thermal_scenes import BENT, ROD, SPIN, USUAL, chains, many, walk
 from scipy import stats
 
 from ibfil.timestepping.base import State
@@ -128,24 +128,6 @@ def test_a_chiral_rod_neither_winds_up_nor_turns_on_average():
     ):
         error = values.std(ddof=1) / np.sqrt(rods)
         assert abs(values.mean() - expected) < 3 * error
-
-
-def chains(count: int, nodes: int, energy: float, seed: int) -> np.ndarray:
-    """Worm-like chains (count, nodes, 3) from Boltzmann's law: angles between segments by exp(cos/(kT ds))."""
-    random, ds = np.random.default_rng(seed), 1.0 / (nodes - 1)
-    stiff = 1 / (energy * ds)
-    uniform = random.random((count, nodes - 1))
-    cos = 1 + np.log(uniform + (1 - uniform) * np.exp(-2 * stiff)) / stiff
-    sin, about = np.sqrt(np.maximum(0, 1 - cos**2)), 2 * np.pi * random.random((count, nodes - 1))
-    t = np.zeros((count, nodes - 1, 3))
-    t[:, 0, 0] = 1
-    for i in range(1, nodes - 1):
-        b = np.cross(t[:, i - 1], [0.0, 0.0, 1.0])
-        b /= np.linalg.norm(b, axis=1)[:, None]
-        c = np.cross(t[:, i - 1], b)
-        across = np.cos(about[:, i, None]) * b + np.sin(about[:, i, None]) * c
-        t[:, i] = cos[:, i, None] * t[:, i - 1] + sin[:, i, None] * across
-    return np.concatenate([np.zeros((count, 1, 3)), np.cumsum(ds * t, axis=1)], axis=1)
 
 
 def mean_square_distance(nodes: int, energy: float, stretching: float) -> float:

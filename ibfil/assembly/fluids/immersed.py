@@ -66,6 +66,7 @@ class ImmersedModel(FluidModel):
         assert self.case.thermal is not None
         free = np.ones((len(rods.s), rods.system.unknowns))
         free.ravel()[rods.system.ends.index] = 0.0
+        free[rods.system.copies] = 0.0
         free[:, 2 if self.case.thermal.planar else 3 :] = 0.0
         return Divergence(1e-4 * self.spacing, free)
 

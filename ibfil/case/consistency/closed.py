@@ -53,7 +53,5 @@ def _itself(key: str, filament: Filament) -> Iterator[Fault]:
 
 
 def _scene(key: str, filament: Filament, case: Scene) -> Iterator[Fault]:
-    if case.thermal is not None:
-        yield Fault(f"{key}.closed", "true with [thermal]", "no thermal noise of closed filaments", ("thermal",))
     if case.fluid.thick:
         yield Fault(f"{key}.closed", "true with fluid.thick", "flows act on their axis only", ("fluid.thick",))

@@ -67,6 +67,8 @@ def _print_comparison(result: Any) -> None:
         f"{f' (no periods: {window.why})' if window.why else ''}, from t = {window.start:.4g} to {window.end:.4g}; "
         "+- their standard error, from the scatter between these, not that of steps, nodes or cells"
     )
+    if any(found.error is not None for column in result.columns for found in column.observed):
+        tell("observed: +- from blocks of their own times; all fluids have the same random numbers")
     for column in result.columns:
         for line in column.own or (column.outcome.message or "nothing that the others do not model",):
             tell(f"  {column.fluid}: {line}")

@@ -22,10 +22,10 @@ from ...screen import tell
 from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import source
-from ..tables import measured, numbers, refuse_strangers, write_csv, write_json
+from ..tables import measured, numbers_with_errors, refuse_strangers, write_csv, write_json
 from .fluids import fluid_overrides, known_fluids
 from .quantities import Quantity, Window, quantities
-from .results import Column, Comparison
+from .results import OBSERVED, Column, Comparison
 
 if TYPE_CHECKING:
     from ...case.schema import Case
@@ -105,7 +105,7 @@ def _column(
         return Column(name, outcome, "", {}, (), ())
     run = runs[name]
     found = quantities(run, window, None if name == first else runs[first])
-    found |= {f"observed: {key}": Quantity(value, None, "") for key, value in _observed(run).items()}
+    found |= {f"{OBSERVED}{key}": Quantity(value, error, "") for key, (value, error) in _observed(run).items()}
     seconds, _, covered = run.pace
     unit = "s" if run.case.units.time == "1" else f"s/{run.case.units.time}"
     if covered > 0:
@@ -114,10 +114,10 @@ def _column(
     return Column(name, outcome, run.method, found, own[name], tuple(share_lines(Simulation(run.case))))
 
 
-def _observed(run: RunFile) -> dict[str, float]:
-    """The case's own observables but for the dissipation, which has its rows."""
+def _observed(run: RunFile) -> dict[str, tuple[float, float | None]]:
+    """The case's own observables but for the dissipation, which has its rows; thermal ones with errors from blocks."""
     heat = run.case.dissipation_observed
-    return {key: value for key, value in numbers(run).items() if key not in heat}
+    return {key: found for key, found in numbers_with_errors(run).items() if key not in heat}
 
 
 def choose_window(case: Case, end: float, period: float | None, transient: float | None) -> Window:
