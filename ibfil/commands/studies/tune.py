@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ...studies.tune.results import Tuned
 
 NAME, HELP = "tune", "the cheapest step and nodes for an error that is allowed, confirmed by a run"
-SHOWN = 5  # candidates
+SHOWN = 3  # candidates
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def add(command: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="OBSERVABLE=1%",
-        help="the error that is allowed, any number of times; without % in the unit of the observable",
+        help="the error that is allowed, any number of times; without %% in the unit of the observable",
     )
     command.add_argument(
         "--quiet", action="store_true", help="write KEY=VALUE only: ibfil run CASE $(ibfil tune CASE --for ... --quiet)"
@@ -71,8 +71,8 @@ def lines(result: Tuned) -> Iterator[str]:
     ratio = result.own.seconds / result.answer.seconds
     words = f"{ratio:.2g} times less than" if ratio >= 1 else f"{1 / ratio:.2g} times more than"
     yield f"cost, from counts: {result.answer.seconds:.2g} s, {words} with the case's own settings"
-    yield f"looking for it took {result.runs} runs, {result.spent:.2g} s of processor time: it pays where many runs follow"
-    yield "kept as they are, being choices: fluid, box, cells, slip, kernel, scheme, order (ibfil uncertainty CASE --meant)"
+    yield f"it took {result.runs} runs to find, {result.spent:.2g} s of processor time: it pays where many runs follow"
+    yield "kept, being choices: fluid, box, cells, slip, kernel, scheme, order (ibfil uncertainty CASE --meant)"
 
 
 def _table(result: Tuned) -> Iterator[str]:
@@ -96,7 +96,8 @@ def _of(number: str, value: float, result: Tuned) -> Iterator[str]:
 
     found, right, doubt = result.checks[number]
     nodes, step, rest = (_amount(part, value) for part in result.answer.bars[number])
-    yield f"  {number} = {with_bar(found, result.answer.bar(number))}: nodes {nodes}, step {step}, place and outputs {rest}"
+    stated = with_bar(found, result.answer.bar(number))
+    yield f"  {number} = {stated}: nodes {nodes}, step {step}, place and outputs {rest}"
     yield f"  a run with them is {_amount(abs(found - right), value)} from the corrected {with_bar(right, doubt)}"
 
 

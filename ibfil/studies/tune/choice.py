@@ -70,7 +70,7 @@ def _bar(one: Estimate) -> float:
 
 
 class Aim(NamedTuple):
-    """A number, the bar ``allowed`` for it, the part of it that neither step nor nodes change, and the laws of these."""
+    """A number, the bar ``allowed`` for it, what neither step nor nodes change of it, the laws of these."""
 
     number: str
     allowed: float

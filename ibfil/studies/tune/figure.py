@@ -39,6 +39,8 @@ def draw(result: Tuned, path: Path) -> None:
 
 def _panel(axes: Axes, result: Tuned, aim: Aim) -> None:
     """Curves over the step for some numbers of nodes; target, answer, the case's own settings."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     value = abs(aim.nodes.coarsest.values[-1])
     scale = 100.0 / value if value > aim.allowed else 1.0
     counts = sorted({result.answer.nodes, *result.probed})
@@ -68,7 +70,10 @@ def _panel(axes: Axes, result: Tuned, aim: Aim) -> None:
     )
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_ylim(top=30 * aim.allowed * scale)
+    axes.set_ylim(top=min(axes.get_ylim()[1], 30 * aim.allowed * scale))
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, place: f"{y:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title(aim.number, loc="left", fontweight="bold")
     axes.set_xlabel("seconds of a run's steps, from counts")
     axes.set_ylabel("error bar, % of the number" if scale != 1.0 else "error bar")

@@ -1,7 +1,7 @@
 """The runs of `ibfil tune`: cheap ones of a grid of levels in step and nodes, one half a cell aside, the answer's.
 
-Levels count from the coarsest: (k, m) has a step 2^k times shorter and nodes 2^m times denser than (0, 0), whose step is
-four times the case's own (or the automatic one, if that is longer) and whose nodes are half as many.
+Levels count from the coarsest: (k, m) has a step 2^k times shorter and nodes 2^m times denser than (0, 0), whose step
+is four times the case's own (or the automatic one, if that is longer), and whose nodes are half as many.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from .choice import FEWEST, Aim, Law, Limits, even, through
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ...case.schema import Case
     from ...io.reader import RunFile
     from ...simulation.simulation import Simulation
     from ..member import Member

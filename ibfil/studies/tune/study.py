@@ -105,7 +105,7 @@ class _Search:
             aims = self._aims()
             found = candidates(aims, self._probe.limits(*self.at, beyond), self._probe.seconds(self.at[1]))
             if not found:
-                raise RunFailed(missed or "no settings found", advice="; ".join(map(_remedy, _hardest(aims))))
+                raise RunFailed(missed or "no settings found", advice=self._remedies(_hardest(aims)))
             best = found[0]
             checks = self._verify(best, aims)
             misses = [one for one in aims if _off(checks, one) > one.allowed]
@@ -118,7 +118,7 @@ class _Search:
             self._log(f"{missed}: finer ones are looked at" if beyond else missed)
             if beyond:
                 self.at = (self.at[0] + 1, min(self.at[1] + 1, REFINED))
-        raise RunFailed(missed, advice="; ".join(map(_remedy, misses)))
+        raise RunFailed(missed, advice=self._remedies(misses))
 
     def _aims(self) -> list[Aim]:
         """The laws, of a probe fine enough to tell. Raises RunFailed where it fails, or the rest is too much."""
@@ -132,7 +132,7 @@ class _Search:
             else:
                 over = [one for one in aims if one.rest >= one.allowed]
                 if over:
-                    raise RunFailed(f"no settings: {_rest(over[0])}", advice=_remedy(over[0]))
+                    raise RunFailed(f"no settings: {_rest(over[0])}", advice=self._remedies(over[:1]))
                 failure = None
                 finer = (
                     any(_too_coarse(one.step, one.allowed) for one in aims),
@@ -145,6 +145,10 @@ class _Search:
                 return aims
             self._log(f"a finer probe: {'the last one failed' if failure else 'errors above the target, or no order'}")
             self.at = following
+
+    def _remedies(self, aims: Sequence[Aim]) -> str:
+        """What to change so that these can be met."""
+        return "; ".join(_remedy(one, self._probe.on_grid) for one in aims)
 
     def _verify(self, best: Settings, aims: Sequence[Aim]) -> dict[str, tuple[float, float, float]]:
         """By number: what a run with the answer has, the corrected value of the probe, and the doubt of that."""
@@ -181,7 +185,7 @@ def _least(one: Aim) -> float:
     return one.rest + one.nodes.bar(one.nodes.sizes[2]) + one.step.bar(one.step.sizes[2])
 
 
-def _remedy(one: Aim) -> str:
+def _remedy(one: Aim, on_grid: bool) -> str:
     """What to change, of one number."""
     why = ""
     for name, law in (("nodes", one.nodes), ("steps", one.step)):
@@ -189,6 +193,5 @@ def _remedy(one: Aim) -> str:
             why += f"{name} show no order, their bar is {law.bar(law.sizes[2]):.2g}; "
     value = abs(one.nodes.coarsest.values[-1])
     share = f" ({100 * _least(one) / value:.2g} %)" if value > 0 else ""
-    return (
-        f"{why}{one.number}: a target above {_least(one):.2g}{share}, or a finer grid (fluid.thickness), more outputs"
-    )
+    others = ", a finer grid (fluid.thickness)" * on_grid + ", a shorter output.every" * (one.rest > 0.2 * one.allowed)
+    return f"{why}{one.number}: a target above {_least(one):.2g}{share}{others}"
