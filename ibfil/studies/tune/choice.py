@@ -139,4 +139,4 @@ def corrected(one: Aim) -> tuple[float, float]:
     """The value of a number without its errors of step and nodes, and the doubt left: that of the middle levels."""
     value = one.step.coarsest.values[0]
     doubts = [law.levels[1].doubt for law in (one.step, one.nodes)]
-    return value - one.step.coarsest.error - one.nodes.coarsest.error, float(np.hypot(*doubts))
+    return value - one.step.coarsest.error - one.nodes.coarsest.error, float(np.hypot(doubts[0], doubts[1]))
