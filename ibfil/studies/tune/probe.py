@@ -95,7 +95,7 @@ class Probe:
         return self._base.member_of(name, keys)
 
     def numbers(self, member: Member) -> Recorded:
-        """What a run recorded. Raises RunFailed where it has no result."""
+        """The records of a run. Raises RunFailed where it has no result."""
         run = self._runs.run(member)
         if run is None:
             raise RunFailed(self._runs.why(member))
@@ -153,7 +153,7 @@ class Probe:
         return laws
 
     def limits(self, k: int, m: int, beyond: bool) -> Limits:
-        """What may be chosen from a probe at (k, m); ``beyond``: coarser settings than it has tried, too."""
+        """The range of a choice from a probe at (k, m); ``beyond``: coarser settings than it has tried, too."""
         fewest = max(FEWEST, (self.nodes(m) - 1) // 2 + 1) if beyond else self.nodes(m)
         longest = min(self.longest, COARSER * self.step(k) if beyond else self.step(k))
         return Limits(fewest, self.nodes(m + 2), longest, self.every, self.end)

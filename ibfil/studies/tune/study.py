@@ -147,7 +147,7 @@ class _Search:
             self.at = following
 
     def _remedies(self, aims: Sequence[Aim]) -> str:
-        """What to change so that these can be met."""
+        """The changes so that these can be met."""
         return "; ".join(_remedy(one, self._probe.on_grid) for one in aims)
 
     def _verify(self, best: Settings, aims: Sequence[Aim]) -> dict[str, tuple[float, float, float]]:
@@ -186,7 +186,7 @@ def _least(one: Aim) -> float:
 
 
 def _remedy(one: Aim, on_grid: bool) -> str:
-    """What to change, of one number."""
+    """The change that one number needs."""
     why = ""
     for name, law in (("nodes", one.nodes), ("steps", one.step)):
         if not law.seen:

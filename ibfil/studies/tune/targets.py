@@ -1,4 +1,4 @@
-"""What `--for` asks: OBSERVABLE=1%, a share of its size, or OBSERVABLE=0.01, in its own unit."""
+"""The targets of `--for`: OBSERVABLE=1%, a share of its size, or OBSERVABLE=0.01, in its own unit."""
 
 from __future__ import annotations
 
