@@ -94,7 +94,7 @@ class Settings:
 
 
 class Limits(NamedTuple):
-    """The range of a choice: nodes from ``fewest`` to ``most``, steps up to ``longest`` that divide ``every`` evenly."""
+    """The range of a choice: nodes from ``fewest`` to ``most``, steps up to ``longest`` that divide ``every``."""
 
     fewest: int
     most: int
