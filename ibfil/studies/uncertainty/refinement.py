@@ -37,7 +37,7 @@ class Ladder:
         first = FINE if fine or not direction.coarser else COARSE
         self._make([*(self._member(direction, k) for k in first), *beside])
         settled = first == COARSE and self._settled(direction)
-        if not settled and first == COARSE:
+        if not settled and first == COARSE and direction.finest:
             self._make([self._member(direction, 2)])
         return settled
 
