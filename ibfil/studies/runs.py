@@ -42,6 +42,11 @@ class Runs:
             if not outcome.done:
                 self.failures.append(f"{outcome.member.name}: {outcome.message}")
 
+    def take(self, outcome: Outcome) -> None:
+        """Count a run that was made elsewhere."""
+        text = self._texts[outcome.member.name] = outcome.member.resolved().text
+        self.outcomes[text] = outcome
+
     def run(self, member: Member) -> RunFile | None:
         """The run of a member; None where it has no result."""
         outcome = self.outcomes.get(self._texts.get(member.name, ""))

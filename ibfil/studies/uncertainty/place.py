@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...case.link import Spring
 from ...errors import CaseError
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def _tied(case: Case, shift: np.ndarray) -> Iterator[str]:
     if case.fluid.flow is not None:
         yield f"fluid.flow={_elsewhere(case.fluid.flow, shift)}"
     for name, link in case.links.items():
-        if any(site.point is not None for site in getattr(link, "between", ())):
+        if isinstance(link, Spring) and any(site.point is not None for site in link.between):
             yield f"link.{name}.between=[{', '.join(_site(site, shift) for site in link.between)}]"
     for name, filament in case.filaments.items():
         for side, end in (("start", filament.start), ("finish", filament.finish)):

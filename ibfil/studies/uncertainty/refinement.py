@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..estimates import Estimate, estimate
 from .levels import Base, Direction, level_member
-from .numbers import Numbers, Recorded
+from .numbers import Numbered, Numbers
 from .results import Source
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ class Ladder:
     def __init__(
         self,
         base: Base,
-        recorded: Recorded,
+        recorded: Numbered,
         make: Callable[[Sequence[Member]], None],
         run: Callable[[Member], RunFile | None],
         why: Callable[[Member], str],

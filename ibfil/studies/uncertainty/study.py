@@ -22,15 +22,13 @@ from ..runs import Runs, spent
 from ..settings import source
 from ..tables import measured
 from . import levels, sampling
+from .discretisation import Found, refined
 from .files import write
 from .levels import Base
-from .numbers import Recorded, moved_back, own
-from .refinement import Ladder
+from .numbers import Recorded, own
 from .results import Bar, Source, Uncertainty
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ...case.schema import Case
 
 RUNS = "runs"
@@ -93,9 +91,6 @@ def _wanted(case: Case, observe: Sequence[str]) -> tuple[str, ...]:
     return tuple(observe) or tuple(case.observe)
 
 
-Found = dict[str, Source]  # of one source, by number
-
-
 def _sources(study: Runs, base: Base, recorded: Recorded, fine: bool, meant: bool) -> list[Found]:
     """All sources of error, each by number."""
     value = recorded.numbers()
@@ -103,7 +98,7 @@ def _sources(study: Runs, base: Base, recorded: Recorded, fine: bool, meant: boo
         words = "hidden by chance: two random runs differ by more than their steps and nodes make"
         found = [_seeds(study, base, recorded, fine), {k: _source("step, nodes", None, words) for k in value}]
     else:
-        found = _refined(study, base, recorded, fine)
+        found = refined(study, base, recorded, fine)
     found.append(sampling.cadence(recorded))
     if base.case.fluid.on_grid and base.case.fluid.single:
         found.append(
@@ -112,45 +107,8 @@ def _sources(study: Runs, base: Base, recorded: Recorded, fine: bool, meant: boo
     return [*found, *(_choices(study, base, recorded) if meant else [])]
 
 
-def _refined(study: Runs, base: Base, recorded: Recorded, fine: bool) -> list[Found]:
-    """The errors of step and nodes, and on a grid of the place in a cell."""
-    ladder = Ladder(base, recorded, study.make, study.run, study.why)
-    in_time = levels.steps(base)
-    under = levels.twice_the_step(base) if ladder.climb(in_time, fine) else ()
-    in_space = levels.nodes(base, under)
-    moved = _half_cell(base, under) if base.case.fluid.on_grid else None
-    ladder.climb(in_space, fine, [] if moved is None or isinstance(moved, str) else [moved[0]])
-    found = [ladder.sources(in_time), ladder.sources(in_space)]
-    if moved is not None:
-        found.append(_place(study, levels.level_member(base, in_space, 0), moved, recorded))
-    return found
-
-
-def _half_cell(base: Base, under: tuple[str, ...]) -> tuple[Member, np.ndarray] | str:
-    """The run half a cell aside, and the shift; or why there is none."""
-    try:
-        return levels.half_cell(base, under)
-    except CaseError as error:
-        return error.faults[0]
-
-
 def _source(name: str, estimate: Estimate | None, words: str, numerical: bool = True) -> Source:
     return Source(name, numerical, estimate, words)
-
-
-def _place(study: Runs, here: Member, moved: tuple[Member, np.ndarray] | str, recorded: Recorded) -> Found:
-    """Half the difference to a run half a cell aside: places on and between grid points are the two extremes."""
-    name, value = "place in a cell", recorded.numbers()
-    if isinstance(moved, str):
-        return {k: _source(name, None, moved) for k in value}
-    own_run, run = study.run(here), study.run(moved[0])
-    if own_run is None or run is None:
-        return {k: _source(name, None, study.why(moved[0] if own_run is not None else here)) for k in value}
-    there, out = moved_back(run, moved[1]), {}
-    for key, number in recorded.of(own_run).numbers().items():
-        error = 0.5 * (number - there[key])
-        out[key] = _source(name, Estimate(error, abs(error), None, "", (number, there[key])), "a run half a cell away")
-    return out
 
 
 def _seeds(study: Runs, base: Base, recorded: Recorded, fine: bool) -> Found:
