@@ -67,11 +67,11 @@ def test_its_own_estimate_is_that_of_a_run_much_finer(proved, tmp_path):
         left = reference.distances(ours, finer)
     for name in ("position", "span"):
         proof = proved.proofs[name][1]
-        assert proof.estimate == pytest.approx(left[name] * 16 / 15, rel=abs(2**proof.order - 4) / 3)
+        assert proof.error == pytest.approx(left[name] * 16 / 15, rel=abs(2**proof.order - 4) / 3)
 
 
 def test_a_reference_without_its_order_is_refused(tmp_path, monkeypatch):
-    """Distances that fall by 1.9 a level are order 0.93, less than 0.7 of two; by 3, order 1.6, enough."""
+    """Distances that fall by 1.9 a level are order 0.93, less than 0.65 of two; by 3, order 1.6, enough."""
     for ratio, refused in ((1.9, ("position",)), (3.0, ())):
         falls = iter(ratio ** -np.arange(100.0))
         monkeypatch.setattr(reference, "distances", lambda a, b, falls=falls: {"position": next(falls)})
