@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -241,7 +242,8 @@ def test_bars_of_rows_are_those_of_uncertainty_and_cover_a_run_much_finer(tmp_pa
     assert main.main(command) == 0  # nothing is run again
     out = capsys.readouterr().out
     assert "+- the bar of step, nodes and place in a cell" in out
-    assert "(scatter " in out
+    assert "distance from the first, rms/L" in out
+    assert re.search(r"the same without rigid motion +- +[\d.e-]+ \(scatter ", out)  # no bar, of what is of two runs
     assert (tmp_path / "both" / "compare.png").stat().st_size > 10_000
     hot = ["thermal.energy=1e-6", "thermal.seed=1", "filament.rod.curvature=[0, 0]"]
     assert main.main([*command, *hot]) == 2

@@ -146,6 +146,5 @@ def _numbers(axes: Axes, result: Comparison, looks: Looks) -> None:
     count, what = (
         (result.window.count, "parts" if result.window.why else "periods") if result.window else (0, "periods")
     )
-    axes.set_xlabel(
-        f"over that of {columns[0].fluid}\n(mean of {count} {what}; bars: {'step, nodes, place' if barred else 'standard error'})"
-    )
+    bars = "step, nodes, place" if barred else "standard error"
+    axes.set_xlabel(f"over that of {columns[0].fluid}\n(mean of {count} {what}; bars: {bars})")
