@@ -10,11 +10,12 @@ from helpers.calibration import CLAMPED, RFT, SCENES, TIP, Z, rod, seen, truth, 
 
 from ibfil.case.reading import parse_case, read_case
 from ibfil.commands.main import main
-from ibfil.errors import CaseError, RunFailed
+from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
 from ibfil.studies.member import Member
 from ibfil.studies.members import run_members
 from ibfil.studies.tune.choice import Aim, Law, Limits, candidates, corrected, even, through
+from ibfil.studies.tune.results import NoSettings
 from ibfil.studies.tune.study import tune
 from ibfil.studies.tune.targets import target
 from ibfil.studies.uncertainty.numbers import Recorded
@@ -130,7 +131,7 @@ def test_answers_meet_their_targets_on_many_scenes(name, tmp_path):
             where = tmp_path / f"{one}{share}"
             try:
                 result = tune(SCENES[name], [f"{one}={share}%"], where, log=quiet)
-            except RunFailed as refusal:
+            except NoSettings as refusal:
                 refused += 1
                 print(f"\n{name} {one} {share} %: {refusal}")
                 continue
@@ -189,12 +190,18 @@ def test_refusals(tmp_path):
         tune(SWAY, ["tip=1%"], tmp_path, ["time.tolerance=1e-3"])
     with pytest.raises(CaseError, match=r"time\.scheme: found explicit"):
         tune(SWAY, ["tip=1%"], tmp_path, ["time.scheme=explicit", "time.order=1"])
-    with pytest.raises(RunFailed, match="no settings") as refusal:
+    with pytest.raises(NoSettings, match="no settings") as refusal:
         tune(SWAY, ["tip=1e-9%"], tmp_path / "round_off", log=quiet)
     assert "a target above" in str(refusal.value)
     assert "grid" not in str(refusal.value)  # there is none
+    assert "the run stopped" not in str(refusal.value)
+    with pytest.raises(
+        NoSettings, match=r"aside = 0 is not told from zero: a target in its own unit, as aside="
+    ) as zero:
+        tune(SWAY + seen("aside", "position", at=TIP, along="[0, 1, 0]"), ["aside=1%"], tmp_path / "zero", log=quiet)
+    assert str(zero.value).startswith("no settings")
     every = seen("reach", "position", at=TIP, along=Z, summary='"max"')
-    with pytest.raises(RunFailed, match="from its place in a cell and its outputs") as refusal:
+    with pytest.raises(NoSettings, match="from its place in a cell and its outputs") as refusal:
         tune(SWAY + every, ["reach=0.1%"], tmp_path / "outputs", log=quiet)
     assert "a shorter output.every" in str(refusal.value)
 

@@ -6,10 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...errors import RunFailed
 from .choice import Aim, Settings
 
 if TYPE_CHECKING:
     from .targets import Target
+
+
+class NoSettings(RunFailed):
+    """A target that no settings meet, or none that a run confirms."""
+
+    def __str__(self) -> str:
+        """Why; what to change: no run stopped."""
+        return "\n".join([self.message, *([f"what to change: {self.advice}"] if self.advice else [])])
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from ..tables import measured, refuse_strangers
 from .choice import Aim, Law, Settings, candidates, corrected, settings
 from .files import DETAILS, FIGURE, SCENE, TABLE, write
 from .probe import Probe
-from .results import Tuned
+from .results import NoSettings, Tuned
 from .targets import targets
 
 if TYPE_CHECKING:
@@ -48,7 +48,8 @@ def tune(
 ) -> Tuned:
     """The cheapest settings for what ``wanted`` allows ("speed=1%"); writes tune.csv, .json, .png and .toml.
 
-    Raises CaseError; RunFailed where no settings are found, or a run with them misses; Interrupted.
+    Raises CaseError; NoSettings where none are found, or a run with them misses; RunFailed where a probe fails;
+    Interrupted.
     """
     folder = Path(folder)
     member = Member("case", source(case), tuple(overrides))
@@ -105,7 +106,7 @@ class _Search:
             aims = self._aims()
             found = candidates(aims, self._probe.limits(*self.at, beyond), self._probe.seconds(self.at[1]))
             if not found:
-                raise RunFailed(missed or "no settings found", advice=self._remedies(_hardest(aims)))
+                raise NoSettings(missed or "no settings found", advice=self._remedies(_hardest(aims)))
             best = found[0]
             checks = self._verify(best, aims)
             misses = [one for one in aims if _off(checks, one) > one.allowed]
@@ -118,7 +119,7 @@ class _Search:
             self._log(f"{missed}: finer ones are looked at" if beyond else missed)
             if beyond:
                 self.at = (self.at[0] + 1, min(self.at[1] + 1, REFINED))
-        raise RunFailed(missed, advice=self._remedies(misses))
+        raise NoSettings(missed, advice=self._remedies(misses))
 
     def _aims(self) -> list[Aim]:
         """The laws, of a probe fine enough to tell. Raises RunFailed where it fails, or the rest is too much."""
@@ -132,7 +133,7 @@ class _Search:
             else:
                 over = [one for one in aims if one.rest >= one.allowed]
                 if over:
-                    raise RunFailed(f"no settings: {_rest(over[0])}", advice=self._remedies(over[:1]))
+                    raise NoSettings(f"no settings: {_rest(over[0])}", advice=self._remedies(over[:1]))
                 failure = None
                 finer = (
                     any(_too_coarse(one.step, one.allowed) for one in aims),
@@ -192,6 +193,9 @@ def _remedy(one: Aim, on_grid: bool) -> str:
         if not law.seen:
             why += f"{name} show no order, their bar is {law.bar(law.sizes[2]):.2g}; "
     value = abs(one.nodes.coarsest.values[-1])
-    share = f" ({100 * _least(one) / value:.2g} %)" if value > 0 else ""
+    if value <= _least(one):
+        own = f"{one.number}={2 * _least(one):.1g}"
+        return f"{one.number} = {value:.2g} is not told from zero: a target in its own unit, as {own}"
+    share = f" ({100 * _least(one) / value:.2g} %)"
     others = ", a finer grid (fluid.thickness)" * on_grid + ", a shorter output.every" * (one.rest > 0.2 * one.allowed)
     return f"{why}{one.number}: a target above {_least(one):.2g}{share}{others}"
