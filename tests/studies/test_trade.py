@@ -105,7 +105,9 @@ VARY = ["--vary", "time.step=5e-3,1e-3", "--vary", "time.scheme=implicit,explici
 def test_a_trade_has_a_table_a_figure_and_ends_with_the_cheapest(here, capsys):
     command = ["trade", "bent.toml", "time.end=0.1", *VARY, "--repeat", "2", "--observe", "position", "-o", "out"]
     assert main.main([*command, "--for", "0.01"]) == 0
-    *_, last = capsys.readouterr().out.splitlines()
+    said = capsys.readouterr()
+    assert "trade --for is deprecated; ibfil tune bent.toml --for OBSERVABLE=1%" in said.err
+    *_, last = said.out.splitlines()
     assert last.split() in (["time.step=5e-3", *IMPLICIT], ["time.step=1e-3", *IMPLICIT])
     with open("out/trade.csv", newline="") as file:
         rows = {(row["time.step"], row["time.scheme"]): row for row in csv.DictReader(file)}
