@@ -7,11 +7,12 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..tables import numbers
+from ..tables import numbers_with_errors
 from ..uncertainty.discretisation import refined
 from ..uncertainty.levels import Base
 from ..uncertainty.numbers import Numbers, moved_back
 from .quantities import Quantity, Window, quantities
+from .results import OBSERVED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,13 +23,11 @@ if TYPE_CHECKING:
     from ..member import Outcome
     from ..runs import Runs
 
-OBSERVED = "observed: "  # before the name of an observable of the case
 
-
-def observed(run: RunFile) -> dict[str, float]:
-    """The case's own observables but for the dissipation, which has its rows."""
+def observed(run: RunFile) -> dict[str, tuple[float, float | None]]:
+    """The case's own observables but for the dissipation, which has its rows; thermal ones with errors from blocks."""
     heat = run.case.dissipation_observed
-    return {key: value for key, value in numbers(run).items() if key not in heat}
+    return {key: found for key, found in numbers_with_errors(run).items() if key not in heat}
 
 
 class Rows:
@@ -37,7 +36,7 @@ class Rows:
     def __init__(self, run: RunFile, window: Window) -> None:
         self._window = window
         self._found = {key: one.value for key, one in quantities(run, window).items()}
-        self._found |= {OBSERVED + key: value for key, value in observed(run).items()}
+        self._found |= {OBSERVED + key: value for key, (value, _) in observed(run).items()}
 
     def of(self, run: RunFile) -> Rows:
         """The same rows of another run."""

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..member import Outcome
 from .quantities import Quantity, Window
 
-if TYPE_CHECKING:
-    pass
+OBSERVED = "observed: "  # what rows of the case's own observables begin with
 
 
 @dataclass(frozen=True)
@@ -23,6 +22,11 @@ class Column:
     numbers: Mapping[str, Quantity]
     own: tuple[str, ...]
     shares: tuple[str, ...]  # of each term in time and memory, from counts
+
+    @property
+    def observed(self) -> list[Quantity]:
+        """Those of the case's own observables."""
+        return [found for name, found in self.numbers.items() if name.startswith(OBSERVED)]
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,10 @@ from ..runs import Runs
 from ..settings import source
 from ..tables import measured, refuse_strangers, write_csv, write_json
 from ..uncertainty.files import row as source_row
-from .bars import OBSERVED, observed, with_bars
+from .bars import observed, with_bars
 from .fluids import fluid_overrides, known_fluids
 from .quantities import Quantity, Window, quantities
-from .results import Column, Comparison
+from .results import OBSERVED, Column, Comparison
 
 if TYPE_CHECKING:
     from ...case.schema import Case
@@ -122,7 +122,7 @@ def _column(
         return Column(name, outcome, "", {}, (), ())
     run = runs[name]
     found = quantities(run, window, None if name == first else runs[first])
-    found |= {OBSERVED + key: Quantity(value, None, "") for key, value in observed(run).items()}
+    found |= {OBSERVED + key: Quantity(value, error, "") for key, (value, error) in observed(run).items()}
     if runs_of is not None:
         found = with_bars(found, outcome, window, runs_of)
     seconds, _, covered = run.pace
