@@ -18,7 +18,7 @@ from numba import njit
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
 from ..linalg.normal_numbers import Draw, Purpose
-from ..linalg.stiffness import Pairs, Rows, Stiffness
+from ..linalg.stiffness import Rows, Stiffness
 from ..linalg.vectors import at, dot, mix, put
 from .base import Flow, Memoryless, Solution
 from .velocity_gradient import advected
