@@ -12,7 +12,8 @@ from ibfil.studies.fit.residuals import motion
 LONG = "t,s,x,y\n0,0,0,0\n0,2,2,0\n1,0,0,1\n1,1,1,1\n1,2,2,1\n"
 SAME = {
     "commas": LONG,
-    "a column more, a comment, the rows mixed": "# by hand\ns,t,X,Y,what\n2,1,2,1,a\n2,0,2,0,b\n0,0,0,0,c\n0,1,0,1,d\n1,1,1,1,e\n",
+    "a column more, a comment, the rows mixed": "# by hand\ns,t,X,Y,what\n2,1,2,1,a\n2,0,2,0,b\n"
+    "0,0,0,0,c\n0,1,0,1,d\n1,1,1,1,e\n",
     "blanks": LONG.replace(",", "  "),
     "decimal commas": LONG.replace(",", ";").replace("\n1;1;1;1", "\n1,0;1;1;1"),
     "units": "t (ms);s_nm;x [um];y_nm\n0;0;0;0\n0;2000;2;0\n1000;0;0;1000\n1000;1000;1;1000\n1000;2000;2;1000\n",
@@ -42,7 +43,8 @@ def test_tables_that_say_the_same_are_read_the_same(tmp_path, text):
 
 
 def test_pixels_frames_order_and_filaments(tmp_path):
-    text = "frame,node,x,z,filament,weight\n4,2,10,0,b,1\n4,1,5,0,b,2\n4,0,0,0,b,1\n2,0,0,0,a,1\n2,1,0,4,a,0\n2,2,0,9,a,1\n"
+    text = "frame,node,x,z,filament,weight\n4,2,10,0,b,1\n4,1,5,0,b,2\n"
+    text += "4,0,0,0,b,1\n2,0,0,0,a,1\n2,1,0,4,a,0\n2,2,0,9,a,1\n"
     found = data(tmp_path, text, {"a": 1.0, "b": 3.0}, scale=0.5, rate=4.0)
     assert found.axes == (0, 2)
     a, b = found.frames

@@ -166,8 +166,8 @@ def _few_ticks(axis: Axis) -> None:
 
 
 def _outer(one: Fitted, off: np.ndarray) -> np.ndarray:
-    """Values of a parameter, by steps from where it was found."""
+    """Values of a parameter within its bounds, by steps from where it was found."""
     parameter = one.parameter
-    if parameter.by_log:
-        return one.value * np.exp(np.clip(off, -300, 300))
-    return one.value + off * (parameter.high - parameter.low)
+    wide = parameter.high - parameter.low
+    values = one.value * np.exp(np.clip(off, -300, 300)) if parameter.by_log else one.value + off * wide
+    return np.asarray(np.clip(values, parameter.low, parameter.high))

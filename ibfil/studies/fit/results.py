@@ -96,6 +96,8 @@ def fitted(parameter: Parameter, inner: float, half: float) -> Fitted:
     low, high = (math.exp(min(inner + sign * half, 700.0)) if parameter.by_log else value + sign * half * scale
                  for sign in (-1, 1))  # fmt: skip
     wide = 0.5 * (high - low) > _UNSETTLED * abs(value) if parameter.by_log else half > 1.0
+    if wide:  # what is known is the bounds
+        low, high = max(low, parameter.low), min(high, parameter.high)
     return Fitted(parameter, value, (low, high), "not determined by these data" if wide else "")
 
 
@@ -107,9 +109,10 @@ def tied(parameters: list[Parameter], spread: Spread, sizes: np.ndarray, directi
         strong = [i for i in range(len(names)) if abs(direction[i]) > 0.2]
         if len(strong) > 1:
             product = " ".join(f"{names[i]}^{direction[i]:.2g}" for i in strong)
+            ratio = sizes[0] / max(float(sizes[-1]), 1e-300)
+            how = f"{ratio:.2g} times less settled than what they settle best" if ratio < 1e6 else "free"
             out.append(
-                f"the data hardly tell {' and '.join(names[i] for i in strong)} apart: {product} is "
-                f"{sizes[0] / sizes[-1]:.0f} times less settled than what they settle best"
+                f"the data hardly tell {' and '.join(names[i] for i in strong)} apart: {product} is {how}"
             )
     correlation = spread.correlation
     for i, one in enumerate(names):
