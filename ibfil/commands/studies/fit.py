@@ -119,5 +119,5 @@ def _row(one: Fitted) -> list[str]:
     if one.interval is None:
         return [one.parameter.key, f"{one.value:.4g}", "", "", one.word]
     low, high = one.interval
-    share = "" if one.half_width is None else f"half-width {100 * one.half_width:.2g} %"
+    share = "" if one.half_width is None or one.word else f"half-width {100 * one.half_width:.2g} %"
     return [one.parameter.key, f"{one.value:.4g}", f"{low:.4g} to {high:.4g}", share, one.word]

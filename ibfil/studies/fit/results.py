@@ -111,9 +111,7 @@ def tied(parameters: list[Parameter], spread: Spread, sizes: np.ndarray, directi
             product = " ".join(f"{names[i]}^{direction[i]:.2g}" for i in strong)
             ratio = sizes[0] / max(float(sizes[-1]), 1e-300)
             how = f"{ratio:.2g} times less settled than what they settle best" if ratio < 1e6 else "free"
-            out.append(
-                f"the data hardly tell {' and '.join(names[i] for i in strong)} apart: {product} is {how}"
-            )
+            out.append(f"the data hardly tell {' and '.join(names[i] for i in strong)} apart: {product} is {how}")
     correlation = spread.correlation
     for i, one in enumerate(names):
         for j in range(i):
