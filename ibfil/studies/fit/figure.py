@@ -146,7 +146,8 @@ def _ellipse(axes: Axes, result: Fit, i: int, j: int) -> None:
     axes.plot(one.value, other.value, "+", color=COLOURS[1], ms=9, mew=1.6)
     for parameter, scale in ((one, axes.set_xscale), (other, axes.set_yscale)):
         if parameter.word:
-            scale("log" if parameter.parameter.by_log else "linear")
+            both = parameter.parameter
+            scale("log" if both.by_log and both.high > 10 * both.low else "linear")
             _few_ticks(axes.xaxis if parameter is one else axes.yaxis)
     axes.set_xlabel(literal(one.parameter.key))
     axes.set_ylabel(literal(other.parameter.key))

@@ -58,7 +58,7 @@ def heading(cell: str) -> Heading | None:
 
 
 def factor(one: Heading, units: tuple[str, str], scale: float | None, rate: float | None) -> float:
-    """What a number of the column is multiplied by to be in the case's ``units`` of length and time.
+    """The number that those of the column are multiplied by to be in the case's ``units`` of length and time.
 
     A ``scale`` or ``rate`` given is taken for what the heading says. Raises CaseError where neither says it.
     """

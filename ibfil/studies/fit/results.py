@@ -1,4 +1,4 @@
-"""What `ibfil fit` found."""
+"""The results of `ibfil fit`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Parameter:
         return self.low > 0
 
     def inner(self, value: float) -> float:
-        """What is searched in: the logarithm, or the value in units of the range."""
+        """The variable of the search: the logarithm, or the value in units of the range."""
         return math.log(value) if self.by_log else value / (self.high - self.low)
 
     def outer(self, inner: float) -> float:
@@ -102,7 +102,7 @@ def fitted(parameter: Parameter, inner: float, half: float) -> Fitted:
 
 
 def tied(parameters: list[Parameter], spread: Spread, sizes: np.ndarray, direction: np.ndarray) -> list[str]:
-    """What the data do not tell apart, in words: the weakest direction, and pairs that go together."""
+    """The directions that the data do not settle, in words: the weakest direction, and pairs that go together."""
     names = [one.key for one in parameters]
     out = []
     if len(names) > 1 and sizes[-1] < 1e-2 * sizes[0]:
