@@ -63,6 +63,9 @@ def read_csv(path: Path, names: tuple[str, ...]) -> np.ndarray:
             continue
         if not rows and tuple(cell.lower() for cell in cells) in (names[:3], names):
             continue
+        if not rows and cells[0].lower()[:2] in (f"{names[0]}{mark}" for mark in "_ (["):
+            own = f"{','.join(names[:3])}, with the numbers in the case's unit of length"
+            raise ValueError(f"line {number} names a unit, and none is converted: {line.strip()[:60]!r}; write {own}")
         try:
             rows.append([float(cell) for cell in cells])
         except ValueError:

@@ -112,6 +112,10 @@ def test_files_that_are_no_points_are_refused_in_one_line(tmp_path: Path) -> Non
     assert refused("a.txt", "0,0,0") == "must end in .csv or .npy"
     assert refused("a.csv", "0,0,0\n1,0,zero\n").startswith("line 2 is not numbers divided by commas: '1,0,zero'")
     assert refused("a.csv", "y,x,z\n0,0,0\n").startswith("line 1 is not numbers")
+    for heading in ("x_um,y_um,z_um", "x (um),y (um),z (um)", "X [nm],Y [nm],Z [nm]"):
+        line = refused("a.csv", f"{heading}\n0,0,0\n")
+        assert line.startswith("line 1 names a unit, and none is converted")
+        assert "write x,y,z, with the numbers in the case's unit of length" in line
     assert refused("a.csv", "0,0,0\n1,0\n") == "line 2 has 2 columns where the first row has 3"
     assert refused("a.csv", "0,0\n1,0\n").startswith("holds 2 x 2 numbers; each row must be x, y, z")
     assert refused("a.csv", "").startswith("holds 0 x 0 numbers")

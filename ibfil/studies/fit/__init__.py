@@ -1,0 +1,1 @@
+"""Parameters from tracked shapes or measured numbers: `ibfil fit`."""
