@@ -22,6 +22,7 @@ from ..errors import CaseError
 from ..io.overwriting import BY_ENDING, Kind, replacing
 from ..io.units import label
 from ..observables.base import KINDS
+from ..observables.copies import series_parts
 from ..observables.time_series import trapezoid_weights
 from .style import AXES, COLOURS, drawing, literal, plane_of_motion, with_units
 
@@ -223,7 +224,7 @@ def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
     series = []
     for name, column in list(run.observables.items())[:SERIES]:
         values = np.asarray(column)
-        lines = {"": values} if values.ndim == 1 else dict(zip(AXES, values.T, strict=True))
+        lines = {_axis(part): line for part, line in series_parts(run.case, name, values).items()}
         series.append((_meaning(run, name), run.units(f"observables/{name}"), lines))
     series += _motion(run)
     for title, parts in DIAGNOSTICS.items():
@@ -231,6 +232,11 @@ def _series(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
         if lines:
             series.append((title, run.units(f"diagnostics/{next(iter(parts))}"), lines))
     return series
+
+
+def _axis(part: str) -> str:
+    """The label of a line: an axis in the figure's words, a copy by its number."""
+    return AXES["xyz".index(part)] if part and part in "xyz" else part
 
 
 def _motion(run: RunFile) -> list[tuple[str, str, dict[str, np.ndarray]]]:
