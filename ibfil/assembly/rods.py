@@ -17,7 +17,8 @@ import numpy as np
 from ..case import spacing
 from ..case.consistency.filament import check_one
 from ..case.copies import copy_name
-from ..case.expressions import ExpressionError
+from ..case.expressions import COPIED, ExpressionError
+from ..case.table import expressions
 from ..errors import CaseError
 from ..rods.base import NoContact
 from ..rods.mesh import Segmented, stack
@@ -104,14 +105,15 @@ def _copies(case: Case, table: str, filament: Filament, many: Copies) -> Iterato
     about, made = np.array(_centre(case, table)), dict[tuple[float, ...], Placed]()
     key, folder = f"{case.file}: filament.{table}", Path(case.file).parent
 
+    differ = any(formula.variables & set(COPIED) for _, formula in expressions(filament))
+
     def own(number: int, values: Mapping[str, float]) -> Placed:
-        it = _own(case, table, number, filament, values)
-        alike = it is filament
-        shape = () if alike else tuple(values.values())
-        if shape not in made:
+        which = tuple(values.values()) if differ else ()
+        if which not in made:
+            it = _own(case, table, number, filament, values) if differ else filament
             made.clear()
-            made[shape] = _one(case, table if alike else copy_name(table, number), table, it)
-        return made[shape]
+            made[which] = _one(case, copy_name(table, number) if differ else table, table, it)
+        return made[which]
 
     sides = case.fluid.sides if case.fluid.on_grid else None
     curve = None if many.apart is None else lambda number, values: own(number, values).r - about
@@ -129,7 +131,7 @@ def _own(case: Case, table: str, number: int, filament: Filament, values: Mappin
         it = filament.of_copy(values)
     except ExpressionError as error:
         raise CaseError([f"{case.file}: {name}: a formula has no value at i = {number} ({error})"]) from None
-    faults = [] if it is filament else [fault.line(case.file) for fault in check_one(name, it, case)]
+    faults = [fault.line(case.file) for fault in check_one(name, it, case)]
     if faults:
         raise CaseError(faults)
     return it

@@ -43,6 +43,10 @@ class RodStack:
         """The filaments that differ: of copies that are alike one."""
         return tuple({id(filament): filament for filament in self.filaments}.values())
 
+    def own(self, table: str) -> Filament:
+        """The filament that the case gives that name, or its first copy."""
+        return self.filaments[self.tables.index(table)]
+
     def variation(self, table: str, expression: Expression) -> dict[str, np.ndarray]:
         """The values (k,) of i and phase over the copies of a filament, of those that a formula of it uses."""
         mine = [f for name, f in zip(self.tables, self.filaments, strict=True) if name == table]
