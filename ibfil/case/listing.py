@@ -70,6 +70,11 @@ def _values(table: type[BaseModel], names: list[str]) -> Iterator[str]:
         yield f"      {describe(info.annotation, tuple(info.metadata))}"
 
 
+def default_text(info: FieldInfo) -> str:
+    """The default of a key as it would stand in the file."""
+    return "required" if info.is_required() else _default(info.get_default())
+
+
 def _default(value: Any) -> str:
     """A default as it would stand in the file."""
     if isinstance(value, tuple):
