@@ -15,8 +15,10 @@ from ibfil.commands import main
 from ibfil.errors import CaseError
 
 # Pairs that no run can have, whatever the scene: each is refused in a line that names both.
-_APART = """rft free, rft wall, rft inertia, rft fields, free fields, wall fields, free inertia, wall inertia, closed clamped, thermal inertia,
-thermal mass, thermal closed, closed mass"""
+_APART = (
+    "rft free,rft wall,rft inertia,rft fields,free fields,wall fields,free inertia,wall inertia,closed clamped,"
+    "thermal inertia,thermal mass,thermal closed,closed mass"
+)
 APART = {frozenset(pair.split()) for pair in _APART.split(",")}
 
 
