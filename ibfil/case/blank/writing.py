@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ...errors import CaseError
 from ..expressions import suggestion
-from ..faults import Entry, entry_of, known_keys, members
+from ..faults import Entry, Fault, entry_of, known_keys, members
 from ..idle import idle_keys
 from ..listing import default_text
 from ..overrides import apply, pairs
@@ -46,9 +46,9 @@ def _scene(words: Sequence[str]) -> dict[str, Any]:
         raise CaseError([f"--with: found {w}{suggestion(w, PHYSICS)}; allowed: {', '.join(PHYSICS)}" for w in unknown])
     raw = load(tomli_w.dumps(START))
     for word in sorted(words, key=list(PHYSICS).index):
-        for path, value in pairs(PHYSICS[word].keys):
-            changed = apply(raw, path, value)
-            if not isinstance(changed, dict):
+        for override in pairs(PHYSICS[word].keys):
+            changed = override if isinstance(override, Fault) else apply(raw, *override)
+            if isinstance(changed, Fault):
                 raise CaseError([changed.line("--with")])
             raw = changed
     try:
