@@ -152,8 +152,8 @@ def test_the_mean_the_spread_and_each_of_the_copies(tmp_path):
     assert np.allclose(np.asarray(file.observables["all"]), tips, atol=1e-14)
     assert np.isclose(result.summaries["mean"].value, over.mean(), rtol=1e-12)
     assert np.allclose(result.summaries["all"].value, over, rtol=1e-12)
-    for name, value in file.numbers.items():
-        assert np.array_equal(value, result.summaries[name].value)
+    for name, one in file.summaries.items():
+        assert np.array_equal(one.value, result.summaries[name].value)
     write_csv(file, tmp_path / "row.csv")
     names = next(csv.reader((tmp_path / "row.csv").open()))
     assert sorted(names) == ["all_000", "all_001", "all_002", "mean", "spread", "time"]
@@ -164,7 +164,7 @@ def test_of_a_fit_the_mean_is_of_the_copies_numbers(tmp_path):
     more = '[observe.v]\nkind = "drift"\nfilament = "hair"\nat = "finish"\ncopies = "mean"\n' + one
     found = {name: summary.value for name, summary in run(row(more=more), tmp_path / "row.h5").summaries.items()}
     assert np.allclose(found["v"], np.mean([found[f"v{k}"] for k in range(3)], axis=0), rtol=1e-12)
-    assert np.array_equal(ibfil.open(tmp_path / "row.h5").numbers["v"], found["v"])
+    assert np.array_equal(ibfil.open(tmp_path / "row.h5").summaries["v"].value, found["v"])
 
 
 @pytest.mark.parametrize(
