@@ -27,9 +27,9 @@ PAGE, PICTURES = ROOT / "cases" / "README.md", ROOT / "postprocess" / "pictures"
 SHAPES = 12
 HEAD = """# The shipped cases
 
-`ibfil run NAME` runs one, `ibfil new NAME mine.toml` copies it. Pictures show its shapes from light to dark as time goes
-on; the number is that of its first `[expect]` table, and the time that of its quick form beside other work. Written by
-`python -m postprocess.gallery`; a test holds it against the cases.
+`ibfil run NAME` runs one, `ibfil new NAME mine.toml` copies it. Pictures show its shapes from light to dark as
+time goes on; the number is that of its first `[expect]` table, and the time that of its quick form beside other
+work. Written by `python -m postprocess.gallery`; a test holds it against the cases.
 """
 
 
