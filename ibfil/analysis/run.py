@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     import pyvista
     import xarray
 
+    from ..observables.observers import Summary
     from .flow import Flow
 
 
@@ -50,11 +52,17 @@ class Run(RunFile):
         return f"<Run {self.path}: {self.status}, {len(self)} outputs, {span}; {filaments}>"
 
     @property
-    def numbers(self) -> dict[str, float | np.ndarray]:
-        """The number, or vector (3,), of each observable of the case: of a drift the speed, of a growth the rate."""
+    def summaries(self) -> dict[str, Summary]:
+        """The number of each observable, as `Result.summaries`: of a drift the speed, of a growth the rate."""
         from ..observables.factory import numbers_of
 
-        return {name: one.value for name, one in numbers_of(self.case, self.time, self.observables).items()}
+        return numbers_of(self.case, self.time, self.observables)
+
+    @property
+    def numbers(self) -> dict[str, float | np.ndarray]:
+        """Deprecated: the values of `summaries`."""
+        warnings.warn("Run.numbers: write run.summaries[NAME].value", DeprecationWarning, stacklevel=2)
+        return {name: one.value for name, one in self.summaries.items()}
 
     def output_at(self, time: float | None = None) -> int:
         """The number of the output nearest to ``time``; the last by default. Raises CaseError outside of the run."""
@@ -122,7 +130,8 @@ class Run(RunFile):
     def to_xarray(self) -> xarray.Dataset:
         """All but the fields as one dataset, read whole: NAME_position (time, NAME_node, xyz) ..., links, observables.
 
-        Each variable carries its units and description. Raises ImportError where xarray is not installed.
+        Nodes are found by arclength, ``sel(NAME_arclength=0.5, method="nearest")``. Each variable carries its units and
+        description. Raises ImportError where xarray is not installed.
         """
         import xarray
 
@@ -148,7 +157,10 @@ class Run(RunFile):
                 dims = ("time", *(f"{name}_{i}" if n != 3 else "xyz" for i, n in enumerate(column.shape[1:])))
                 about = {"units": self.units(f"{group}/{name}"), "description": self.description(f"{group}/{name}")}
                 variables[name] = (dims, np.asarray(column), about)
-        return xarray.Dataset(variables, coordinates, {"title": self.case.title, "case": self.case_text})
+        whole = xarray.Dataset(variables, coordinates, {"title": self.case.title, "case": self.case_text})
+        for name in self.filaments:  # whole.sel(rod_arclength=0.5, method="nearest")
+            whole = whole.set_xindex(f"{name}_arclength")
+        return whole
 
     def _of_bodies(self) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
         """The variables of bodies and motors: NAME_position (time, xyz) ..., NAME_motor_rate (time) ..."""

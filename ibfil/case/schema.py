@@ -193,6 +193,6 @@ class Case(Scene):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy. Raises TypeError with ``update``: it would not be checked, nor be in the text that is recorded."""
         if update:
-            keys = ", ".join(f"{key}=..." for key in update)
-            raise TypeError(f"a case is changed by overrides: ibfil.parse_case(case.text, case.file, ['{keys}'])")
+            keys = ", ".join(f'"{key}": ...' for key in update)
+            raise TypeError(f"a case is changed by overrides: ibfil.read_case(case, {{{keys}}})")
         return super().model_copy(deep=deep)

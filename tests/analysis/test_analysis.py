@@ -143,6 +143,10 @@ def test_a_dataset_for_xarray(made):
         assert data["long_position"].dims == ("time", "long_node", "xyz")
         assert data["long_tension"].dims == ("time", "long_segment")
         assert data["long_force"].attrs["units"] == "pN"
+        half = 0.5 * float(data["long_arclength"][-1])
+        np.testing.assert_array_equal(
+            data["long_position"].sel(long_arclength=half, method="nearest"), run.filaments["long"]["position"][:, 4]
+        )
         np.testing.assert_array_equal(data["short_position"].sel(time=0.75), run.filaments["short"]["position"][3])
         np.testing.assert_array_equal(data["tip"].sel(xyz="y"), run.observables["tip"][:, 1])
 
