@@ -199,5 +199,5 @@ def test_a_parameter_named_phase_is_what_it_was():
 
 def test_an_error_bar_is_of_a_mean_or_a_spread(tmp_path):
     (tmp_path / "row.toml").write_text(row(more=TIP.format("all") + "along = [1, 0, 0]\n").text)
-    with pytest.raises(CaseError, match='observe.tip.copies: found "all"; allowed: a mean or spread'):
+    with pytest.raises(CaseError, match=r'observe.tip.copies: found "all"; allowed: a mean or spread'):
         uncertainty(str(tmp_path / "row.toml"), tmp_path / "out")
