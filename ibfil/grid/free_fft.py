@@ -80,27 +80,25 @@ class FreeSolve:
         t.real[:] = 0.0
         for v in vectors:
             spread(local, weights, np.ascontiguousarray(force[:, v : v + 3]), t.real[v : v + 3])
-        t.forward(3 * self._vectors)
-        self.convolve()
-        t.backward(3 * self._vectors)
+        t.through(self._convolved)
         return np.hstack([interpolate(local, weights, t.real[v : v + 3]) for v in vectors])
 
-    def convolve(self) -> None:
-        """The modes times the symbols, in place."""
+    def _convolved(self, modes: np.ndarray, first: int) -> None:
+        """Modes, from ``first`` on along the second axis, times the symbols, in place."""
         if self._vectors == 1:
-            _convolve(self.transform.modes.view(float), self._symbols)
+            _convolve(modes.view(float), first, self.cells[1], self._symbols)
         else:
-            _convolve_torques(self.transform.modes, self._symbols)
+            _convolve_torques(modes, first, self.cells[1], self._symbols)
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _convolve(f, symbols):
+def _convolve(f, first, ny, symbols):
     """u_a = G_ab f_b in place on modes (3, nx, ny, 2 (nz/2 + 1)) seen as pairs of reals; symbols likewise."""
-    _, nx, ny, nz = f.shape
+    _, nx, lines, nz = f.shape
     for i in range(nx):
         p, sx = (i, 1.0) if 2 * i <= nx else (nx - i, -1.0)
-        for j in range(ny):
-            q, sy = (j, 1.0) if 2 * j <= ny else (ny - j, -1.0)
+        for j in range(lines):
+            q, sy = (first + j, 1.0) if 2 * (first + j) <= ny else (ny - first - j, -1.0)
             sxy = sx * sy
             for k in range(nz):
                 u, v, w = f[0, i, j, k], f[1, i, j, k], f[2, i, j, k]
@@ -111,13 +109,13 @@ def _convolve(f, symbols):
 
 
 @njit(cache=True)
-def _convolve_torques(f, symbols):
+def _convolve_torques(f, first, ny, symbols):
     """u = G f + R x T, w = R x f + W T in place on modes (6, nx, ny, nz/2 + 1)."""
-    _, nx, ny, nz = f.shape
+    _, nx, lines, nz = f.shape
     for i in range(nx):
         p, sx = (i, 1.0) if 2 * i <= nx else (nx - i, -1.0)
-        for j in range(ny):
-            q, sy = (j, 1.0) if 2 * j <= ny else (ny - j, -1.0)
+        for j in range(lines):
+            q, sy = (first + j, 1.0) if 2 * (first + j) <= ny else (ny - first - j, -1.0)
             for k in range(nz):
                 s = symbols[:, p, q, k]
                 u, v, w = f[0, i, j, k], f[1, i, j, k], f[2, i, j, k]

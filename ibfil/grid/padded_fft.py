@@ -6,17 +6,21 @@ only those along the first through all; back, the same in reverse. That is 7 of 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .fft import plan, useful_threads
 from .fftw import pyfftw
 
+_CACHE = 2**18  # bytes of a block
+
 
 class PaddedTransform:
-    """Forward and backward transforms of ``real`` (fields, nx, ny, nz) and ``modes`` (fields, nx, ny, nz//2 + 1).
+    """Transforms of ``real`` (fields, nx/2, ny/2, nz) to modes (fields, nx, ny, nz//2 + 1), and back.
 
-    ``real`` is zero beyond the first half along each axis; what ``backward`` leaves there is of no use. Neither keeps
-    its source, and the normalisation 1/(nx ny nz) is the caller's.
+    ``real`` is to be zero beyond the first half of its last axis; what is left there after is of no use. The
+    normalisation 1/(nx ny nz) is the caller's.
     """
 
     def __init__(self, cells: tuple[int, int, int], threads: int = 1, fields: int = 3) -> None:
@@ -26,33 +30,38 @@ class PaddedTransform:
         self.size = nx * ny * nz
         threads = useful_threads(self.size, threads)
         hx, hy = nx // 2, ny // 2
+        thin, half = self.modes[:, :hx, :hy], self.modes[:, :hx]
         self._pad = (self.modes[:, :hx, hy:], self.modes[:, hx:])
-        self._forward, self._backward = [], []
-        for real, modes in zip(self.real, self.modes, strict=True):
-            thin, half = modes[:hx, :hy], modes[:hx]
-            self._forward += [
-                plan(real, thin, (2,), "FFTW_FORWARD", threads),
-                plan(half, half, (1,), "FFTW_FORWARD", threads),
-                plan(modes, modes, (0,), "FFTW_FORWARD", threads),
-            ]
-            self._backward += [
-                plan(modes, modes, (0,), "FFTW_BACKWARD", threads),
-                plan(half, half, (1,), "FFTW_BACKWARD", threads),
-                plan(thin, real, (2,), "FFTW_BACKWARD", threads),
-            ]
+        self._into = (
+            plan(self.real, thin, (3,), "FFTW_FORWARD", threads),
+            plan(half, half, (2,), "FFTW_FORWARD", threads),
+        )
+        self._out = (
+            plan(half, half, (2,), "FFTW_BACKWARD", threads),
+            plan(thin, self.real, (3,), "FFTW_BACKWARD", threads),
+        )
+        lines = max(1, _CACHE // (16 * fields * nx * (nz // 2 + 1)))
+        self._blocks = []
+        for first in range(0, ny, lines):
+            block = self.modes[:, :, first : first + lines]
+            plans = (plan(block, block, (1,), way, threads) for way in ("FFTW_FORWARD", "FFTW_BACKWARD"))
+            self._blocks.append((first, block, *plans))
         self.real[:] = 0.0
         self.modes[:] = 0.0
 
-    def forward(self, fields: int = 3) -> np.ndarray:
-        """``modes`` of the first ``fields`` of ``real``."""
-        for part in self._pad:
-            part[:fields] = 0.0
-        for one in self._forward[: 3 * fields]:
-            one.execute()
-        return self.modes
+    def through(self, work: Callable[[np.ndarray, int], None]) -> np.ndarray:
+        """``real`` there and back, times the number of cells; on the way ``work`` has all modes, a block at a time.
 
-    def backward(self, fields: int = 3) -> np.ndarray:
-        """``real`` of the first ``fields`` of ``modes``, times the number of cells."""
-        for one in self._backward[: 3 * fields]:
+        Blocks are (fields, nx, k, nz//2 + 1), of modes from a number on along the second axis, and near the processor.
+        """
+        for part in self._pad:
+            part[:] = 0.0
+        for one in self._into:
+            one.execute()
+        for first, block, forward, backward in self._blocks:
+            forward.execute()
+            work(block, first)
+            backward.execute()
+        for one in self._out:
             one.execute()
         return self.real

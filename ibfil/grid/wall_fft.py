@@ -68,14 +68,12 @@ class WallSolve:
         t.real[:] = 0.0
         spread(local, plain, force, t.real[:3])
         spread(local, raised, force, t.real[3:])
-        t.forward(6)
-        self.convolve()
-        t.backward(6)
+        t.through(self._convolved)
         return interpolate(local, plain, t.real[:3]) + interpolate(local, raised, t.real[3:])
 
-    def convolve(self) -> None:
-        """The modes of f and f' into those of P and Q, in place."""
-        _convolve(self.transform.modes, self._free, self._images)
+    def _convolved(self, modes: np.ndarray, first: int) -> None:
+        """Modes of f and f', from ``first`` on along the second axis, into those of P and Q, in place."""
+        _convolve(modes, first, self.cells[1], self._free, self._images)
 
 
 @njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})
@@ -95,12 +93,12 @@ def _reflect(t, sx, sy, f, g):
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _convolve(f, free, images):
-    nz, ny, nx = f.shape[1:]
+def _convolve(f, first, ny, free, images):
+    nz, lines, nx = f.shape[1:]
     for i in range(nz // 2 + 1):
         other = (nz - i) % nz
-        for j in range(ny):
-            row, sy = (j, 1.0) if 2 * j <= ny else (ny - j, -1.0)
+        for j in range(lines):
+            row, sy = (first + j, 1.0) if 2 * (first + j) <= ny else (ny - first - j, -1.0)
             for k in range(nx):
                 here = (f[0, i, j, k], f[1, i, j, k], f[2, i, j, k]), (f[3, i, j, k], f[4, i, j, k], f[5, i, j, k])
                 there = (

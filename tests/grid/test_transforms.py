@@ -244,17 +244,25 @@ def test_a_cache_that_cannot_be_replaced_is_no_fault_and_leaves_nothing_behind()
     assert {p.name for p in file.parent.iterdir()} == {file.name, "fftw-wisdom.lock"}
 
 
-@pytest.mark.parametrize("cells", [(8, 12, 10), (2, 6, 4)])
+@pytest.mark.parametrize("cells", [(8, 12, 10), (2, 6, 4), (4, 96, 40)])
 def test_a_padded_transform_is_the_whole_one_of_half_a_box(cells: tuple[int, int, int]) -> None:
-    """Forth, and back from modes that fill the whole box; twice, for what is left there from before."""
+    """Forth, and back from modes that fill the whole box; in one block and several; twice, for what is left behind."""
     whole, padded = VectorTransform(cells, fields=6), PaddedTransform(cells, fields=6)
     x, y, z = (n // 2 for n in cells)
     rng = np.random.default_rng(0)
+    factors = rng.standard_normal((*cells[:2], cells[2] // 2 + 1))
     for _ in range(2):
         whole.real[:], padded.real[:] = 0.0, 0.0
         whole.real[:, :x, :y, :z] = padded.real[..., :z] = rng.standard_normal((6, x, y, z))
-        assert padded.forward(6) == pytest.approx(whole.forward(6), abs=1e-12)
-        whole.modes *= 1.0 + np.arange(cells[0])[:, None, None]
-        padded.modes *= 1.0 + np.arange(cells[0])[:, None, None]
-        felt = whole.backward(6)[:, :x, :y, :z]
-        assert padded.backward(6)[..., :z] == pytest.approx(felt, abs=1e-12 * np.abs(felt).max())
+        seen = np.zeros_like(whole.modes)
+
+        def work(modes: np.ndarray, first: int, seen: np.ndarray = seen) -> None:
+            lines = slice(first, first + modes.shape[2])
+            seen[:, :, lines] = modes
+            modes *= factors[:, lines]
+
+        felt = padded.through(work)[..., :z]
+        assert seen == pytest.approx(whole.forward(6), abs=1e-11)
+        whole.modes *= factors
+        expected = whole.backward(6)[:, :x, :y, :z]
+        assert felt == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())

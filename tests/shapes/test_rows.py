@@ -14,6 +14,7 @@ from ibfil.case.formulas.evaluation import function_of
 from ibfil.errors import CaseError
 from ibfil.observables.factory import observers
 from ibfil.simulation.simulation import Simulation
+from ibfil.studies.uncertainty.study import uncertainty
 
 ROD = """
 length = 1.0
@@ -194,3 +195,9 @@ def test_a_parameter_named_phase_is_what_it_was():
         "old.toml",
     )
     assert case.filaments["hair"].curvature[0].variables == {"s", "t"}
+
+
+def test_an_error_bar_is_of_a_mean_or_a_spread(tmp_path):
+    (tmp_path / "row.toml").write_text(row(more=TIP.format("all") + "along = [1, 0, 0]\n").text)
+    with pytest.raises(CaseError, match=r'observe.tip.copies: found "all"; allowed: a mean or spread'):
+        uncertainty(str(tmp_path / "row.toml"), tmp_path / "out")

@@ -83,6 +83,11 @@ def uncertainty(
 
 def _wanted(case: Case, observe: Sequence[str]) -> tuple[str, ...]:
     """The observables asked for. Raises CaseError."""
+    each = [name for name in observe or case.observe if name in case.observe and case.observe[name].of_each]
+    if each:
+        raise CaseError(
+            [f'{case.file}: observe.{each[0]}.copies: found "all"; allowed: a mean or spread has an error bar']
+        )
     if not case.observe:
         raise CaseError([f"{case.file}: [observe]: found none; allowed: at least one, an error bar is of a number"])
     strange = [name for name in observe if name not in case.observe]
