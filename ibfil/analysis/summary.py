@@ -14,6 +14,7 @@ from ..io.overwriting import replacing, table_of
 from ..io.reader import RunFile
 from ..io.units import label
 from ..observables.base import Observable
+from ..observables.copies import series_parts
 from ..observables.expectations import check
 from ..observables.factory import numbers_of, observers
 from ..observables.observers import Summary
@@ -212,15 +213,15 @@ TABLE = table_of("time")  # what `write_csv` writes
 def write_csv(run: RunFile, path: Path) -> None:
     """Time and all observables as a table under one row of names, all digits; a vector in three columns.
 
-    A name has its units behind it, "speed (um/s)", where the case labels any.
+    Copies of a filament have a column each. A name has its units behind it, "speed (um/s)", where the case labels any.
     """
     columns: dict[str, np.ndarray] = {_heading("time", run.units("time")): run.time}
     for name, column in run.observables.items():
         values, units = np.asarray(column), run.units(f"observables/{name}")
-        if values.ndim == 1:
-            columns[_heading(name, units)] = values
-        else:
-            columns |= {_heading(f"{name}_{axis}", units): values[:, i] for i, axis in enumerate("xyz")}
+        columns |= {
+            _heading(f"{name}_{part}" if part else name, units): series
+            for part, series in series_parts(run.case, name, values).items()
+        }
     with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(columns)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..case import link as tables
-from ..case.filament import copy_name
+from ..case.copies import copy_name
 from ..errors import CaseError
 from ..rods.links.base import Elements, Link, length
 from ..rods.links.bind import Binding, Bound, Driven, Motors, OfTime

@@ -19,15 +19,33 @@ if TYPE_CHECKING:
 def _pieces(
     filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray, pick: Pick
 ) -> list[tuple[slice, Callable, np.ndarray]]:
-    """One function of (s, t) for each run of filaments that share an expression."""
-    runs: list[tuple[slice, Expression]] = []
+    """One function of (s, t) for each run of filaments that share an expression; i and phase of copies by node."""
+    runs: list[list[tuple[slice, Expression]]] = []
     for filament, where in zip(filaments, nodes, strict=True):
         expression = pick(filament)
-        if runs and runs[-1][1] == expression:
-            runs[-1] = (slice(runs[-1][0].start, where.stop), expression)
+        if runs and _shared(runs[-1][0][1]) == _shared(expression):
+            runs[-1].append((where, expression))
         else:
-            runs.append((where, expression))
-    return [(where, expression.bind("s", "t"), s[where]) for where, expression in runs]
+            runs.append([(where, expression)])
+    return [(slice(run[0][0].start, run[-1][0].stop), *_run(run, s)) for run in runs]
+
+
+def _shared(expression: Expression) -> Expression:
+    """The formula that all copies share, or the expression itself."""
+    return expression if expression.origin is None else expression.origin[0]
+
+
+def _run(run: list[tuple[slice, Expression]], s: np.ndarray) -> tuple[Callable, np.ndarray]:
+    """The function of (s, t) of filaments that share a formula, and the arclength (k,) of their nodes."""
+    here = s[run[0][0].start : run[-1][0].stop]
+    shared, first = _shared(run[0][1]), run[0][1]
+    if first is shared:
+        return first.bind("s", "t"), here
+    given = [dict(expression.origin[1]) for _, expression in run if expression.origin]
+    counts = [where.stop - where.start for where, _ in run]
+    fixed = [np.repeat([values[name] for values in given], counts) for name in given[0]]
+    whole = shared.bind("s", "t", *given[0])
+    return lambda at, t: whole(at, t, *fixed), here
 
 
 def field(filaments: Sequence[Filament], nodes: Sequence[slice], s: np.ndarray, pick: Pick) -> Field:

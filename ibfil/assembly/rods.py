@@ -5,7 +5,7 @@ The fluid is assembled in assembly/fluids. Nothing is built that the case does n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..case import spacing
-from ..case.filament import copy_name
+from ..case.consistency.filament import check_one
+from ..case.copies import copy_name
+from ..case.expressions import COPIED, ExpressionError
+from ..case.table import expressions
 from ..errors import CaseError
 from ..rods.base import NoContact
 from ..rods.mesh import Segmented, stack
@@ -29,6 +32,7 @@ from .rest import settled
 from .stacked import RodStack
 
 if TYPE_CHECKING:
+    from ..case.copies import Copies
     from ..case.filament import Filament
     from ..case.schema import Case
     from ..rods.constitutive import MomentLaw
@@ -44,6 +48,7 @@ class Placed(NamedTuple):
     """One filament where it starts: name, arclength (k,), positions and directors (k, 3), tangents of its clamps."""
 
     name: str
+    table: str  # the name that the case gives it, or all its copies
     filament: Filament
     s: np.ndarray
     r: np.ndarray
@@ -78,20 +83,58 @@ def _place(case: Case) -> list[Placed]:
     """All filaments, copies one by one. Raises CaseError for shapes that cannot be made."""
     out = []
     for name, filament in case.filaments.items():
-        key, folder = f"{case.file}: filament.{name}", Path(case.file).parent
-        s = spacing.node_arclength(filament, key)
-        held = _clamp_tangents(filament, key, folder)
-        segmented = _segmented(filament, s, held, case.thermal is not None)
-        r, e1 = initial.initial_shape(filament, key, folder, partial(settled, filament, segmented))
         if filament.copies is None:
-            out.append(Placed(name, filament, s, r, e1, held))
-            continue
-        about = _centre(case, name)
-        for k, turn, shift in copies.places(filament.copies, about, key, folder):
-            moved = (r - about) @ turn.T + shift
-            first, last = (None if t is None else turn @ t for t in held)
-            out.append(Placed(copy_name(name, k), filament, s, moved, e1 @ turn.T, (first, last)))
+            out.append(_one(case, name, name, filament))
+        else:
+            out += _copies(case, name, filament, filament.copies)
     return out
+
+
+def _one(case: Case, name: str, table: str, filament: Filament) -> Placed:
+    """One filament where its own keys put it."""
+    key, folder = f"{case.file}: filament.{name}", Path(case.file).parent
+    s = spacing.node_arclength(filament, key)
+    held = _clamp_tangents(filament, key, folder)
+    segmented = _segmented(filament, s, held, case.thermal is not None)
+    r, e1 = initial.initial_shape(filament, key, folder, partial(settled, filament, segmented))
+    return Placed(name, table, filament, s, r, e1, held)
+
+
+def _copies(case: Case, table: str, filament: Filament, many: Copies) -> Iterator[Placed]:
+    """The copies of a filament, turned about its position and moved; shapes are made anew where formulas differ."""
+    about, made = np.array(_centre(case, table)), dict[tuple[float, ...], Placed]()
+    key, folder = f"{case.file}: filament.{table}", Path(case.file).parent
+
+    differ = any(formula.variables & set(COPIED) for _, formula in expressions(filament))
+
+    def own(number: int, values: Mapping[str, float]) -> Placed:
+        which = tuple(values.values()) if differ else ()
+        if which not in made:
+            it = _own(case, table, number, filament, values) if differ else filament
+            made.clear()
+            made[which] = _one(case, copy_name(table, number) if differ else table, table, it)
+        return made[which]
+
+    sides = case.fluid.sides if case.fluid.on_grid else None
+    curve = None if many.apart is None else lambda number, values: own(number, values).r - about
+    for place in copies.places(many, key, folder, curve, sides):
+        it, turn = own(place.number, place.values), place.turn
+        moved = (it.r - about) @ turn.T + place.point
+        first, last = (None if t is None else turn @ t for t in it.held)
+        yield it._replace(name=copy_name(table, place.number), r=moved, e1=it.e1 @ turn.T, held=(first, last))
+
+
+def _own(case: Case, table: str, number: int, filament: Filament, values: Mapping[str, float]) -> Filament:
+    """The filament that one copy is. Raises CaseError for what its formulas make that is not allowed."""
+    name = f"filament.{copy_name(table, number)}"
+    try:
+        it = filament.of_copy(values)
+    except ExpressionError as error:
+        raise CaseError([f"{case.file}: {name}: a formula has no value at i = {number} ({error})"]) from None
+    faults = [fault.line(case.file) for fault in check_one(name, it, case)]
+    if faults:
+        raise CaseError(faults)
+    return it
 
 
 def _centre(case: Case, name: str) -> tuple[float, float, float]:
@@ -140,7 +183,7 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
         s[where] = p.s  # of the last node of a closed rod its length, not 0
     unknowns = 4 if any(f.twisting is not None for f in filaments) else 3
     ends, free = prescribed_ends(filaments, nodes, ranges, unknowns)
-    own = [next((law for name, law in given.items() if case.filaments[name] is f), None) for f in filaments]
+    own = [given.get(p.table) for p in placed]
     law = laws.law(filaments, ranges, s, mesh, [each if hasattr(each, "bending") else None for each in own])
     if any(hasattr(each, "active") for each in own):
         law = laws.active(case, law, given, dict(zip([p.name for p in placed], ranges, strict=True)), s)
@@ -165,7 +208,9 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     start = system.start(r, e1)
     for part in system.remembering:
         part.start(start)
-    out = RodStack(names, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined))
+    tables = tuple(p.table for p in placed)
+    known = names, tables, filaments, tuple(nodes), tuple(ranges)
+    out = RodStack(*known, s, system, start, touching, tuple(joined))
     if not case.bodies:
         return out
     from .bodies import with_bodies

@@ -50,7 +50,7 @@ def _too_soft(case: Case, stacked: RodStack, k: int, energy: float) -> str:
     worst = int(np.argmax(softness))
     if softness[worst] <= SOFTEST:
         return ""
-    name = next(name for name, filament in case.filaments.items() if filament is stacked.filaments[k])
+    name = stacked.tables[k]
     stretching = stacked.system.stretching[where.start + worst]
     found = f"{stretching:g}, for a thermal stretch of {np.sqrt(softness[worst]):.2g} (rms) of a segment"
     allowed = f"at least {stretching * softness[worst] / SOFTEST:.3g} = kT/({SOFTEST:g} ds), or fewer nodes"

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from ..case.table import expressions
 from ..rods.base import NoContact
 from ..rods.geometry import Configuration
 from ..rods.system import RodSystem
 
 if TYPE_CHECKING:
     from ..bodies.system import RodsWithBodies
+    from ..case.expressions import Expression
     from ..case.filament import Filament
     from ..rods.contact import Contact
     from ..rods.links.base import Link
@@ -30,6 +32,7 @@ class RodStack:
     """
 
     names: tuple[str, ...]
+    tables: tuple[str, ...]  # the names that the case gives them: of copies one
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
     ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
@@ -55,6 +58,21 @@ class RodStack:
     def nodes_at_start(self) -> Configuration:
         """The configuration of the nodes alone at t = 0."""
         return Configuration(self.start.table[: self.count])
+
+    @property
+    def different(self) -> tuple[Filament, ...]:
+        """The filaments that differ: of copies that are alike one."""
+        return tuple({id(filament): filament for filament in self.filaments}.values())
+
+    def own(self, table: str) -> Filament:
+        """The filament that the case gives that name, or its first copy."""
+        return self.filaments[self.tables.index(table)]
+
+    def variation(self, table: str, expression: Expression) -> dict[str, np.ndarray]:
+        """The values (k,) of i and phase over the copies of a filament, of those that a formula of it uses."""
+        mine = [f for name, f in zip(self.tables, self.filaments, strict=True) if name == table]
+        found = [dict(f.origin[1]) for it in mine for _, f in expressions(it) if f.origin and f.origin[0] == expression]
+        return {name: np.array([one[name] for one in found]) for name in (found[0] if found else ())}
 
     @cached_property
     def groups(self) -> tuple[tuple[slice, ...], ...]:

@@ -34,6 +34,9 @@ def fill_defaults(filled: dict[str, Any], parameters: Parameters) -> None:
             table("filament", name).setdefault("derivative", 2)
         if _is_upright(table("filament", name).get("direction"), parameters):
             table("filament", name).setdefault("normal", UPRIGHT_NORMAL)
+        copies = table("filament", name, "copies")
+        if {"at", "file"} & set(copies):
+            copies.setdefault("orientation", "same")
         for end in (table("filament", name, "start"), table("filament", name, "finish")):
             if end.get("end") == "clamped":
                 end.setdefault("twist", "held")

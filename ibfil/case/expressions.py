@@ -11,10 +11,17 @@ import difflib
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
+
+from .formulas import trees
+from .formulas.trees import BINARY, COMPARE, fold, leaves, text_of
+from .formulas.trees import FUNCTIONS as FUNCTIONS
+from .formulas.trees import MAX_EXPONENT as MAX_EXPONENT
+from .formulas.trees import ExpressionError as ExpressionError
+from .formulas.trees import Tree as Tree
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,83 +30,16 @@ if TYPE_CHECKING:
 MAX_LENGTH = 2000  # characters
 MAX_NODES = 500  # of the syntax tree
 MAX_DEPTH = 100  # of the syntax tree: no walk of it meets Python's limit of recursion
-MAX_EXPONENT = 16.0
-
 VARIABLES = ("s", "t", "x", "y", "z", "q")
+COPIED = ("i", "phase")  # of a copy: its number from 0 on, its phase; a parameter of such a name stands before it
 CONSTANTS = {"pi": math.pi}
 
-# A number; a variable's name; (operator or function, arguments ...); (comparison, left, right) in where
-Tree = float | str | tuple[Any, ...]
 # None: a parameter whose own value is at fault, which is told once and not at each use
 Parameters = Mapping[str, float | None]
 
 
-class ExpressionError(ValueError):
-    """A fault of an expression, as a clause that fits in brackets."""
-
-
 class BrokenParameter(ExpressionError):
     """An expression that uses a parameter whose own value is at fault."""
-
-
-def _sign(x: float) -> float:
-    return float((x > 0.0) - (x < 0.0))
-
-
-def _step(x: float) -> float:
-    return 0.0 if x < 0.0 else 1.0
-
-
-class _Function(NamedTuple):
-    """One function: its least and largest number of arguments, its value."""
-
-    least: int
-    most: int
-    value: Callable[..., float]
-
-
-FUNCTIONS: dict[str, _Function] = {
-    "sin": _Function(1, 1, math.sin),
-    "cos": _Function(1, 1, math.cos),
-    "tan": _Function(1, 1, math.tan),
-    "asin": _Function(1, 1, math.asin),
-    "acos": _Function(1, 1, math.acos),
-    "atan": _Function(1, 1, math.atan),
-    "atan2": _Function(2, 2, math.atan2),
-    "sinh": _Function(1, 1, math.sinh),
-    "cosh": _Function(1, 1, math.cosh),
-    "tanh": _Function(1, 1, math.tanh),
-    "exp": _Function(1, 1, math.exp),
-    "log": _Function(1, 1, math.log),
-    "sqrt": _Function(1, 1, math.sqrt),
-    "abs": _Function(1, 1, abs),
-    "sign": _Function(1, 1, _sign),
-    "min": _Function(2, 8, min),
-    "max": _Function(2, 8, max),
-    "where": _Function(3, 3, lambda chosen, yes, no: yes if chosen else no),
-    "step": _Function(1, 1, _step),  # 0 below 0, 1 from 0 on
-}
-_BINARY: dict[type[ast.operator], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Pow: "**",
-}
-_COMPARE: dict[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
-_VALUES: dict[str, Callable[..., float | bool]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-    "**": math.pow,
-    "neg": lambda a: -a,
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
-    **{name: function.value for name, function in FUNCTIONS.items()},
-}
 
 
 @dataclass(frozen=True)
@@ -109,6 +49,8 @@ class Expression:
     text: str = field(compare=False)  # as written
     tree: Tree
     variables: frozenset[str]  # those it uses
+    # Of a copy: the formula that all copies share, and the values of i and phase that made this one of it.
+    origin: tuple[Expression, tuple[tuple[str, float], ...]] | None = field(default=None, compare=False, repr=False)
 
     @property
     def constant(self) -> float | None:
@@ -117,23 +59,43 @@ class Expression:
 
     def at(self, **values: float) -> float:
         """Its value, by ``math``, at these values of its variables. Raises ExpressionError without one."""
-        return _value(self.tree, values)
+        return trees.value_of(self.tree, dict.fromkeys(COPIED, 0.0) | values)
+
+    def of_copy(self, **values: float) -> Expression:
+        """The expression of one copy, where i and phase have these values; itself where it uses neither.
+
+        Raises ExpressionError where it then has a constant part without a finite value.
+        """
+        used = {name: value for name, value in values.items() if name in self.variables}
+        if not used:
+            return self
+        tree = fold(trees.replaced(self.tree, used))
+        left = frozenset(leaf for leaf in leaves(tree) if isinstance(leaf, str))
+        return Expression(self.text, tree, left, (self, tuple(used.items())) if left else None)
 
     def bind(self, *names: str) -> Callable[..., np.ndarray]:
         """A function of ``names`` in that order: floats or arrays in, a float64 array of their shape out.
 
+        Of a formula of i or phase that is of no copy yet it is that of the first copy, with phase 0.
         Any threads may call it; some microseconds a call for short arrays. Where there is no value (1/0, sqrt(-1)), inf
         or nan. Raises ValueError if the expression uses a variable that is not among ``names``.
         """
         import numpy as np
 
-        from .evaluation import function_of
+        from .formulas.evaluation import function_of
 
-        if self.variables - set(names):
+        missing = self.variables - set(names)
+        if missing & set(COPIED):
+            return self.of_copy(**dict.fromkeys(COPIED, 0.0)).bind(*names)
+        if missing:
             raise ValueError(f"{self.text!r} uses {sorted(self.variables)}, bound to {names}")
         if isinstance(self.tree, float):
             value = self.tree
             return lambda *args: np.full(np.broadcast(*args).shape, value)
+        if self.origin is not None:  # compiled once for all copies
+            shared, values = self.origin
+            whole = shared.bind(*names, *(name for name, _ in values))
+            return lambda *args: whole(*args, *(value for _, value in values))
         used = tuple(i for i, name in enumerate(names) if name in self.variables)
         function = function_of(self.tree, tuple(names[i] for i in used))
         if len(used) == len(names):
@@ -157,13 +119,13 @@ def parse(value: str | int | float, variables: Sequence[str] = (), parameters: P
         raise ExpressionError("neither a number nor a text")
     if not isinstance(value, str):
         return Expression(repr(value), _finite(value), frozenset())
-    tree = _fold(_read(_syntax(value), variables, parameters or {}))
-    return Expression(value, tree, frozenset(leaf for leaf in _leaves(tree) if isinstance(leaf, str)))
+    tree = fold(_read(_syntax(value), variables, parameters or {}))
+    return Expression(value, tree, frozenset(leaf for leaf in leaves(tree) if isinstance(leaf, str)))
 
 
 def of_tree(tree: Tree) -> Expression:
     """The expression of a tree made of others' parts."""
-    return Expression(_text(tree), tree, frozenset(leaf for leaf in _leaves(tree) if isinstance(leaf, str)))
+    return Expression(text_of(tree), tree, frozenset(leaf for leaf in leaves(tree) if isinstance(leaf, str)))
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -223,8 +185,8 @@ def _read(node: ast.AST, variables: Sequence[str], parameters: Parameters) -> Tr
             return _finite(value)
         case ast.Name(id=name):
             return _name(name, variables, parameters)
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-            return (_BINARY[type(op)], read(left), read(right))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in BINARY:
+            return (BINARY[type(op)], read(left), read(right))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
             return read(operand)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
@@ -240,7 +202,7 @@ def _read(node: ast.AST, variables: Sequence[str], parameters: Parameters) -> Tr
 
 
 def _name(name: str, variables: Sequence[str], parameters: Parameters) -> Tree:
-    if name in variables:
+    if name in variables and not (name in COPIED and name in parameters):
         return name
     if name in CONSTANTS:
         return CONSTANTS[name]
@@ -251,9 +213,9 @@ def _name(name: str, variables: Sequence[str], parameters: Parameters) -> Tree:
         return float(value)
     if name in FUNCTIONS:
         raise ExpressionError(f"{name} is a function, so it needs brackets after it")
-    if name in VARIABLES:
+    if name in VARIABLES or name in COPIED:
         raise ExpressionError(f"{name} has no meaning here")
-    known = [*variables, *CONSTANTS, *islice(parameters, 100)]
+    known = [*(name for name in variables if name not in COPIED), *CONSTANTS, *islice(parameters, 100)]
     hint = suggestion(name, known) or f"; there are {', '.join(known[:20])}"
     raise ExpressionError(f"unknown name '{name[:100]}'{hint}")
 
@@ -272,73 +234,6 @@ def _check_call(name: str, count: int, names: set[str]) -> None:
 
 def _condition(node: ast.expr, read: Callable[[ast.AST], Tree]) -> Tree:
     match node:
-        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARE:
-            return (_COMPARE[type(op)], read(left), read(right))
+        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in COMPARE:
+            return (COMPARE[type(op)], read(left), read(right))
     raise ExpressionError("the first argument of where must be one comparison with <, <=, > or >=")
-
-
-def _fold(tree: Tree) -> Tree:
-    """The tree with its constant parts worked out; of a where with a constant condition, the branch."""
-    if not isinstance(tree, tuple):
-        return tree
-    op, *children = tree
-    if op == "where":
-        _, left, right = children[0]
-        left, right = _fold(left), _fold(right)
-        if isinstance(left, float) and isinstance(right, float):
-            return _fold(children[1 if _VALUES[children[0][0]](left, right) else 2])
-        return (op, (children[0][0], left, right), _fold(children[1]), _fold(children[2]))
-    children = [_fold(child) for child in children]
-    if op == "/" and children[1] == 0.0:
-        raise ExpressionError("division by zero")
-    if op == "**" and not (isinstance(children[1], float) and abs(children[1]) <= MAX_EXPONENT):
-        raise ExpressionError(f"an exponent must be a number, at most {MAX_EXPONENT:g} in size")
-    if all(isinstance(child, float) for child in children):
-        return _apply(op, children)
-    return (op, *children)
-
-
-def _apply(op: str, values: list[float]) -> float:
-    """One operation on numbers; ExpressionError where it has no finite value."""
-    try:
-        result = float(_VALUES[op](*values))
-    except (ValueError, ZeroDivisionError, OverflowError):
-        result = math.nan
-    if not math.isfinite(result):
-        shown = f" {op} ".join(f"{v:.6g}" for v in values) if op in _BINARY.values() else f"{op}({values[0]:.6g})"
-        raise ExpressionError(f"{shown} has no finite value")
-    return result
-
-
-def _value(tree: Tree, values: Mapping[str, float]) -> float:
-    """The value of the tree by ``math``, where each variable has the given value."""
-    if isinstance(tree, float):
-        return tree
-    if isinstance(tree, str):
-        return float(values[tree])
-    op, *children = tree
-    if op == "where":
-        compare, left, right = children[0]
-        chosen = _VALUES[compare](_value(left, values), _value(right, values))
-        return _value(children[1 if chosen else 2], values)
-    return _apply(op, [_value(child, values) for child in children])
-
-
-def _leaves(tree: Tree) -> Iterator[float | str]:
-    """The numbers and variables of the tree."""
-    if isinstance(tree, tuple):
-        for child in tree[1:]:
-            yield from _leaves(child)
-    else:
-        yield tree
-
-
-def _text(tree: Tree) -> str:
-    """The tree as a text that `parse` reads, every operation in brackets."""
-    if not isinstance(tree, tuple):
-        return tree if isinstance(tree, str) else f"({tree!r})"
-    op, *children = tree
-    parts = [_text(child) for child in children]
-    if op == "neg":
-        return f"(-{parts[0]})"
-    return f"{op}({', '.join(parts)})" if op in FUNCTIONS else f"({parts[0]}{op}{parts[1]})"

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 from pydantic import Discriminator, Field
 
 from .bodies.end import End
+from .copies import Copies, copy_name
 from .expressions import Expression
 from .shape import AnyShape, Straight
-from .table import ORIGIN, ZERO, Table
+from .table import ORIGIN, ZERO, Table, changed
 from .values import (
-    Count,
     Formula,
     Listed,
     NotNegative,
@@ -22,7 +22,6 @@ from .values import (
     Positive,
     Range,
     Real,
-    Seed,
     TripleS,
     TripleST,
     TripleSTXYZ,
@@ -110,29 +109,6 @@ class Loads(Table):
     tether: Tether | None = Field(None, description="springs per length to a shape")
 
 
-class Copies(Table):
-    """The same filament in many places."""
-
-    count: Count | None = Field(None, description="how many, placed at random in region")
-    seed: Seed = Field(1, description="seed of the random places")
-    region: Annotated[tuple[Vector, Vector], Listed(2)] | None = Field(
-        None, description="two corners of the box they are placed in"
-    )
-    orientation: Literal["random", "same"] = Field(
-        "random", description="how they are turned: each by a random rotation, or not at all"
-    )
-    file: str | None = Field(
-        None,
-        description="csv of the places, instead of count and region: a row x, y, z a copy, or x, y, z and a quaternion "
-        "qx, qy, qz, qw that turns it",
-    )
-
-    @property
-    def turned_alike(self) -> bool:
-        """Whether copies are not turned."""
-        return self.orientation == "same"
-
-
 class Filament(Table):
     """One elastic rod."""
 
@@ -195,6 +171,13 @@ class Filament(Table):
         None, description="linking number of a closed filament that twists; absent: the one of least twist"
     )
 
+    def of_copy(self, values: Mapping[str, float]) -> Filament:
+        """The filament that one copy is, by its i and phase; itself where no formula uses them.
+
+        Raises ExpressionError where a formula then has no finite value.
+        """
+        return cast(Filament, changed(self, lambda formula: formula.of_copy(**values)))
+
     @property
     def keeps_no_plane(self) -> bool:
         """Whether it is round and naturally straight: without twisting it then bends in any plane."""
@@ -221,11 +204,6 @@ class Filament(Table):
         if self.align != "auto":
             return self.align
         return "axis" if self.shape.has_axis else "tangent"
-
-
-def copy_name(name: str, number: int) -> str:
-    """The name of copy ``number``, from 0 on, of a filament: NAME_003."""
-    return f"{name}_{number:03d}"
 
 
 def single(filaments: Mapping[str, Filament], name: str) -> Filament | None:

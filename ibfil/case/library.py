@@ -71,11 +71,19 @@ def copy(name: str, target: str) -> Path:
 
     Raises CaseError for a name that is not shipped, a target that is there, or one that cannot be written.
     """
-    source = named(name)
+    return _write(named(name).read_bytes(), target)
+
+
+def write(text: str, target: str) -> Path:
+    """Write the text of a case to the file ``target``, which must not exist; returns its path. Raises CaseError."""
+    return _write(text.encode(), target)
+
+
+def _write(content: bytes, target: str) -> Path:
     path = Path(target)
     try:
         with path.open("xb") as out:
-            out.write(source.read_bytes())
+            out.write(content)
     except FileExistsError:
         raise CaseError([f"{target}: is there already; nothing was written"]) from None
     except OSError as error:

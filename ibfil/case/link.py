@@ -7,13 +7,13 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from .expressions import Expression
 from .table import ZERO, Table
 from .values import (
+    Formula,
     Listed,
     NotNegative,
     Number,
-    OfS,
-    OfST,
     Place,
     Positive,
     Range,
@@ -22,6 +22,9 @@ from .values import (
     by_kind,
     tagged,
 )
+
+_OfS = Annotated[Expression, Formula(variables=("s",))]  # of links, which have no copies of their own
+_OfST = Annotated[Expression, Formula(variables=("s", "t"))]
 
 
 class Site(Table):
@@ -150,10 +153,10 @@ class Bind(AnyLink):
     )
     range: Range | None = Field(None, description="arclengths [s1, s2] of a that are bound; absent: all")
     offset: Real = Field(0.0, description="s of b beside s = 0 of a")
-    shear: OfS = Field(ZERO, description="shear stiffness kt: force per length and length of slide, of s on a")
-    normal: OfS = Field(description="stiffness kn against a change of distance, likewise", examples=[1e4])
-    slide: OfST = Field(ZERO, description="preferred slide of b along a, by s on a")
-    force: OfST = Field(ZERO, description="active shear force per length: > 0 pulls b towards finish, a towards start")
+    shear: _OfS = Field(ZERO, description="shear stiffness kt: force per length and length of slide, of s on a")
+    normal: _OfS = Field(description="stiffness kn against a change of distance, likewise", examples=[1e4])
+    slide: _OfST = Field(ZERO, description="preferred slide of b along a, by s on a")
+    force: _OfST = Field(ZERO, description="active shear force per length: > 0 pulls b towards finish, a towards start")
     distance: Annotated[float | Literal["initial"], Number(("initial",), low=0)] = Field(
         "initial", description="of the axes; initial: at each s that of the start"
     )

@@ -16,7 +16,8 @@ from .values import describe, keys, plain
 RULES = f"""\
 A case is one TOML file. Unknown keys are errors. Any number may be a text with a constant expression of
 [parameters]. An "expression of s, t" names the only variables allowed there: s is the arclength from `start`,
-t the time, x y z a position, q runs from 0 to 1; names of [parameters] may stand in every expression.
+t the time, x y z a position, q runs from 0 to 1; in a filament with copies i is the number of a copy, from 0 on, and
+phase its copies.phase; names of [parameters] may stand in every expression.
 Operators: + - * / ** (the exponent a number of size <= {MAX_EXPONENT:g}), and < <= > >= in where.
 Functions: {" ".join(FUNCTIONS)}. Constants: {" ".join(CONSTANTS)}.
 Keys of a fluid that is not chosen are checked and do nothing. NAME is yours to choose.
@@ -67,6 +68,11 @@ def _values(table: type[BaseModel], names: list[str]) -> Iterator[str]:
         default = "required" if info.is_required() else f"default {_default(info.get_default())}"
         yield f"  {key}: {info.description} ({default})"
         yield f"      {describe(info.annotation, tuple(info.metadata))}"
+
+
+def default_text(info: FieldInfo) -> str:
+    """The default of a key as it would stand in the file."""
+    return "required" if info.is_required() else _default(info.get_default())
 
 
 def _default(value: Any) -> str:

@@ -87,6 +87,11 @@ class Observe(Table):
     filament: str = Field(
         "", description="name of a filament; where there are several, needed but for dissipation and flux"
     )
+    copies: Literal["none", "mean", "spread", "all"] = Field(
+        "none",
+        description="filament with copies: the mean over them, their standard deviation, or a number for each; none: "
+        "of one copy, by its name NAME_003",
+    )
     link: str = Field("", description="name of a link, where the kind looks at one")
     body: str = Field("", description="name of a body, where the kind looks at one")
     motor: str = Field(
@@ -114,6 +119,16 @@ class Observe(Table):
     def together(self) -> bool:
         """Whether it is of all filaments together."""
         return self.kind in ("dissipation", "flux")
+
+    @property
+    def over_copies(self) -> bool:
+        """Whether it is of all copies of a filament."""
+        return self.copies != "none"
+
+    @property
+    def of_each(self) -> bool:
+        """Whether it is a number for each copy."""
+        return self.copies == "all"
 
     @property
     def pumps(self) -> bool:

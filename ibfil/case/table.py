@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
@@ -18,6 +19,20 @@ class Table(BaseModel):
     """A table of the file: no other keys, nothing converted that is not said to be."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+def changed(value: Any, change: Callable[[Expression], Expression]) -> Any:
+    """A table, list or key with every formula in it changed; the same object where no formula is."""
+    if isinstance(value, Expression):
+        return change(value)
+    if isinstance(value, tuple):
+        items = [changed(item, change) for item in value]
+        return value if all(a is b for a, b in zip(items, value, strict=True)) else tuple(items)
+    if isinstance(value, BaseModel):
+        inner = {key: changed(getattr(value, key), change) for key in type(value).model_fields}
+        new = {key: item for key, item in inner.items() if item is not getattr(value, key)}
+        return value.model_copy(update=new) if new else value
+    return value
 
 
 def expressions(value: object, path: str = "") -> Iterator[tuple[str, Expression]]:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, Discriminator, GetCoreSchemaHandler, GetJsonSchemaHandler, Tag, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from .expressions import BrokenParameter, Expression, ExpressionError, Parameters, parse, suggestion
+from .expressions import COPIED, BrokenParameter, Expression, ExpressionError, Parameters, parse, suggestion
 
 NUMBER = "a number (or constant expression)"
 SMALLEST, LARGEST = 1e-60, 1e60  # beyond, products of a few numbers overflow or vanish
@@ -139,6 +139,7 @@ class Formula(Kind):
     """A number or an expression in which ``variables`` may stand."""
 
     variables: tuple[str, ...] = ()
+    copied: bool = False  # of a filament: i and phase may stand in it where it has copies
 
     def _values(self) -> str:
         return f"a number or an expression of {', '.join(self.variables)}"
@@ -147,7 +148,7 @@ class Formula(Kind):
         return [{"type": "number"}, {"type": "string", "description": self._values()}]
 
     def _take(self, value: Any, parameters: Parameters | None) -> Expression:
-        return read_expression(value, self.variables, parameters)
+        return read_expression(value, self.variables + (COPIED if self.copied else ()), parameters)
 
 
 @dataclass(frozen=True)
@@ -204,10 +205,12 @@ Positive = Annotated[float, Number(low=0)]
 NotNegative = Annotated[float, Number(low=0, open=False)]
 Count = Annotated[int, Whole(low=1)]
 Seed = Annotated[int, Whole()]
-OfS = Annotated[Expression, Formula(variables=("s",))]
-OfT = Annotated[Expression, Formula(variables=("t",))]
-OfST = Annotated[Expression, Formula(variables=("s", "t"))]
-OfSTXYZ = Annotated[Expression, Formula(variables=("s", "t", "x", "y", "z"))]
+OfS = Annotated[Expression, Formula(variables=("s",), copied=True)]
+OfT = Annotated[Expression, Formula(variables=("t",), copied=True)]
+OfST = Annotated[Expression, Formula(variables=("s", "t"), copied=True)]
+OfSTXYZ = Annotated[Expression, Formula(variables=("s", "t", "x", "y", "z"), copied=True)]
+OfI = Annotated[Expression, Formula(variables=("i",))]
+OfIXYZ = Annotated[Expression, Formula(variables=("i", "x", "y", "z"))]
 OfXYZT = Annotated[Expression, Formula(variables=("x", "y", "z", "t"))]
 Vector = Annotated[tuple[Real, Real, Real], Listed(3)]
 Sizes = Annotated[tuple[Positive, Positive, Positive], Listed(3)]
@@ -218,6 +221,7 @@ TripleT = Annotated[tuple[OfT, OfT, OfT], Listed(3)]
 TripleST = Annotated[tuple[OfST, OfST, OfST], Listed(3)]
 TripleSTXYZ = Annotated[tuple[OfSTXYZ, OfSTXYZ, OfSTXYZ], Listed(3)]
 TripleXYZT = Annotated[tuple[OfXYZT, OfXYZT, OfXYZT], Listed(3)]
+TripleI = Annotated[tuple[OfI, OfI, OfI], Listed(3)]
 PairST = Annotated[tuple[OfST, OfST], Listed(2)]
 
 

@@ -77,7 +77,8 @@ class Oscillation(NamedTuple):
 def oscillations(simulation: Simulation) -> dict[str, Oscillation]:
     """Those of the scene by filament; in a fluid with inertia, or of several rods, only about those of each alone."""
     out = {}
-    for name, filament in simulation.case.filaments.items():
+    for name in simulation.case.filaments:
+        filament = simulation.rods.own(name)
         if filament.mass is None:
             continue
         root = timescales.bending_roots(filament, simulation.drag(filament))[0]
@@ -100,7 +101,8 @@ def groups(simulation: Simulation) -> dict[str, float]:
     """The dimensionless groups of the scene; with several filaments each name begins with the filament's."""
     filaments = simulation.case.filaments
     out: dict[str, float] = {}
-    for name, filament in filaments.items():
+    for name in filaments:
+        filament = simulation.rods.own(name)
         prefix = "" if len(filaments) == 1 else f"{name}: "
         found = of_filament(simulation, filament) | _in_shear(simulation, name)
         out.update({prefix + key: value for key, value in found.items()})

@@ -10,7 +10,9 @@ import numpy as np
 from ..assembly.contact import strength
 from ..assembly.fluids.models import fluid_model
 from ..assembly.loads import ALONG, ON_ENDS, named
+from ..case.expressions import COPIED
 from ..case.idle import idle_keys
+from ..case.table import expressions
 from ..observables.factory import observers
 from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
@@ -22,6 +24,7 @@ from .dimensionless import groups, oscillations
 from .warnings import warnings
 
 if TYPE_CHECKING:
+    from ..case.filament import Filament
     from ..case.fluid import Contact
     from ..case.schema import Case, Thermal
 
@@ -52,6 +55,19 @@ def _section(title: str, lines: list[str]) -> list[str]:
 _MOTIONS = {"moves": "prescribed motion", "spin": "spin", "angle": "prescribed turn"}
 
 
+def _copies(filament: Filament) -> str:
+    """How many copies there are, and how they differ; nothing of one filament."""
+    many = filament.copies
+    if many is None:
+        return ""
+    count = "a copy for each row of " + many.file if many.file is not None else f"{many.count} copies"
+    used = {name for path, e in expressions(filament) if not path.startswith("copies.") for name in e.variables}
+    varied = sorted(used & set(COPIED))
+    differ = f" that differ by {' and '.join(varied)}; groups and warnings are those of the first" if varied else ""
+    apart = "" if many.apart is None else f", at least {many.apart:g} apart"
+    return f" each, {count}{apart}{differ}"
+
+
 def modelled(case: Case) -> list[str]:
     """Each term the case asks for, one line each."""
     out = []
@@ -74,7 +90,7 @@ def modelled(case: Case) -> list[str]:
         terms += [row.words for row in named(ALONG, f.loads)]
         if not (f.moved or f.turned):
             terms.append("standing where its points are given (0.1.0 moved and turned them to position and direction)")
-        out.append(f"filament {name}, {f.nodes} nodes: " + ", ".join(terms))
+        out.append(f"filament {name}, {f.nodes} nodes{_copies(f)}: " + ", ".join(terms))
     out += [f"link {name}: {link.words}" for name, link in case.links.items()]
     out += [of_body(name, body) for name, body in case.bodies.items()]
     if case.fluid.flow is not None:

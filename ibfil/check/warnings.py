@@ -38,7 +38,8 @@ RINGS, EXPLODES = 0.1, 0.3  # kT a node in ringing motions: variances are off by
 def warnings(simulation: Simulation) -> list[str]:
     """One sentence for each thing that runs but may not mean what its user thinks."""
     case, fluid, out = simulation.case, simulation.model.fluid_model, list(simulation.case.deprecated)
-    for name, filament in case.filaments.items():
+    for name in case.filaments:
+        filament = simulation.rods.own(name)
         key, found = f"filament.{name}", of_filament(simulation, filament)
         out += fluid.warnings_of(simulation, name, found)
         out += _of_waves(key, found)

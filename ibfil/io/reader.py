@@ -145,9 +145,10 @@ class RunFile:
         return node_arclength(self.filament(name))
 
     def filament(self, name: str) -> Filament:
-        """The case's table of a filament; a copy NAME_000 has that of NAME."""
+        """The case's table of a filament; a copy NAME_003 has that of NAME at i = 3, phase left open."""
         tables = self.case.filaments
-        return tables[name] if name in tables else tables[name.rpartition("_")[0]]
+        stem, _, number = name.rpartition("_")
+        return tables[name] if name in tables else tables[stem].of_copy({"i": float(number)})
 
     @cached_property
     def case(self) -> Case:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import CaseError
 from .base import KINDS, Observable, Unfit
+from .copies import OverCopies
 from .observers import ObservableSet, Summary, summaries
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def observers(case: Case, extra: Mapping[str, Observable] | None = None) -> Obse
     faults: list[str] = []
     for name, observe in case.observe.items():
         try:
-            made[name] = KINDS[observe.kind](case, observe)
+            made[name] = (KINDS[observe.kind] if not observe.over_copies else OverCopies)(case, observe)
         except Unfit as fault:
             faults.append(f"{case.file}: observe.{name}.{fault}")
     if not faults:

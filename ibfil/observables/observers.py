@@ -85,7 +85,7 @@ def summaries(
     for name, observable in observables.items():
         over, end, note = getattr(observable, "over", None), float(times[-1]), ""
         samples = np.asarray(series[name], float)
-        value: Value = float("nan") if samples.ndim == 1 else np.full(3, np.nan)
+        value: Value = float("nan") if samples.ndim == 1 else np.full(samples.shape[1:], np.nan)
         if over is not None and end < over[1] - 1e-9 * abs(over[1]):
             note = f"the run ended at {end:.6g}, within `over` = {_shown(over)}"
         quality = ""

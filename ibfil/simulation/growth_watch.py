@@ -40,7 +40,7 @@ class GrowthWatch:
     def __init__(self, model: Model) -> None:
         self._model, self._system = model, model.rods.system
         self._fluid = model.fluid_model.local_fluid(model.rods)
-        filaments = model.case.filaments.values()
+        filaments = model.rods.different
         self._slowest = timescales.slowest_bending(model)
         across = {id(f): model.fluid_model.drag(f) for f in filaments}
         stiffness = {id(f): float(np.min(f.stretching.bind("s")(np.linspace(0, f.length, 11)))) for f in filaments}

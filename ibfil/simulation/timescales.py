@@ -81,7 +81,7 @@ def bending_time(drag: float, length: float, bending: float, start: str, finish:
 
 def slowest_bending(model: Model) -> float:
     """Relaxation time of the slowest bending mode of any filament; where it oscillates, the time of one radian."""
-    return max(_slowest(f, model.fluid_model.drag(f)) for f in model.case.filaments.values())
+    return max(_slowest(f, model.fluid_model.drag(f)) for f in model.rods.different)
 
 
 def _slowest(filament: Filament, drag: float) -> float:
@@ -112,7 +112,7 @@ def seen(rate: complex, dt: float, order: int) -> complex:
 def inertial_time(model: Model) -> float:
     """The shortest time in which inertia shows: a radian of the slowest bending where it oscillates, else m/zeta."""
     times = [np.inf]
-    for filament in model.case.filaments.values():
+    for filament in model.rods.different:
         if filament.mass is not None:
             drag = model.fluid_model.drag(filament)
             roots = bending_roots(filament, drag)

@@ -58,7 +58,7 @@ def observed(run: RunFile) -> dict[str, np.ndarray]:
 
 
 def numbers(run: RunFile) -> dict[str, float]:
-    """The same with a vector as NAME_x, NAME_y, NAME_z."""
+    """The same with a vector as NAME_x, NAME_y, NAME_z, and copies as NAME_000, NAME_001 ..."""
     return {key: value for key, (value, _) in numbers_with_errors(run).items()}
 
 
@@ -66,14 +66,14 @@ def numbers_with_errors(run: RunFile) -> dict[str, tuple[float, float | None]]:
     """The same, each with its standard error; None where it has none."""
     import numpy as np
 
+    from ..observables.copies import number_parts
+
     out: dict[str, tuple[float, float | None]] = {}
     for name, one in summaries_of(run).items():
         value = np.asarray(one.value, float)
-        error = [None] * 3 if one.error is None else np.atleast_1d(one.error).tolist()
-        keys = [f"{name}_{letter}" for letter in "xyz"] if value.ndim else [name]
-        out |= {
-            key: (float(part), error[i]) for i, (key, part) in enumerate(zip(keys, np.atleast_1d(value), strict=True))
-        }
+        error = [None] * value.size if one.error is None else np.atleast_1d(one.error).tolist()
+        for i, (part, number) in enumerate(number_parts(run.case, name, value).items()):
+            out[f"{name}_{part}" if part else name] = float(number), error[i]
     return out
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..analysis.energy import elastic_energy
 from ..io.units import label
 from ..observables.base import KINDS
+from ..observables.copies import series_parts
 from ..observables.time_series import trapezoid_weights
 from .moments import Moments
 from .style import AXES, COLOURS, literal, with_units
@@ -45,7 +46,7 @@ def panels(run: RunFile) -> list[Panel]:
     series = []
     for name, column in list(run.observables.items())[:SERIES]:
         values = np.asarray(column)
-        lines = {"": values} if values.ndim == 1 else dict(zip(AXES, values.T, strict=False))
+        lines = {_axis(part): line for part, line in series_parts(run.case, name, values).items()}
         series.append(Panel(_meaning(run, name), run.units(f"observables/{name}"), lines))
     series += _motion(run)
     for title, parts in DIAGNOSTICS.items():
@@ -58,6 +59,11 @@ def panels(run: RunFile) -> list[Panel]:
 def thermal(run: RunFile) -> bool:
     """Whether the run has noise: a velocity of it is a kick over the step, and says nothing of the motion."""
     return run.case.thermal is not None and run.case.thermal.energy > 0
+
+
+def _axis(part: str) -> str:
+    """The label of a line: an axis in the figure's words, a copy by its number."""
+    return AXES["xyz".index(part)] if part and part in "xyz" else part
 
 
 def _motion(run: RunFile) -> list[Panel]:

@@ -15,8 +15,9 @@ from helpers.expression_trees import CAREFUL, PARAMETERS, PLAIN, VARIABLES, Numb
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from ibfil.case import evaluation, expressions
+from ibfil.case import expressions
 from ibfil.case.expressions import Expression, ExpressionError, parse
+from ibfil.case.formulas import evaluation
 
 
 def _python(text: str, names: dict) -> object:

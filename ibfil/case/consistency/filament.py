@@ -7,11 +7,13 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from ..bodies.end import End
-from ..expressions import Expression, ExpressionError
+from ..copies import Copies, copy_name
+from ..expressions import COPIED, Expression, ExpressionError
 from ..faults import Fault, shown
-from ..filament import Filament, TwoWell, copy_name, single
+from ..filament import Filament, TwoWell, single
 from ..schema import Scene
 from ..shape import Circle, Helix, RunShape
+from ..table import expressions
 from .mass import check_mass
 from .planar import check_planar
 from .vectors import parallel
@@ -20,9 +22,15 @@ from .vectors import parallel
 def check_filament(name: str, filament: Filament, case: Scene) -> Iterator[Fault]:
     """All faults of what does not go together in ``[filament.name]``."""
     key = f"filament.{name}"
+    yield from _copied(key, filament, case)
+    yield from check_one(key, filament, case)
     stem = name.rpartition("_")[0]
     if stem in case.filaments and single({stem: case.filaments[stem]}, name) is not None:
         yield Fault(key, f"the name of a copy of {stem}", f"another name; copies are called {copy_name(stem, 0)} ...")
+
+
+def check_one(key: str, filament: Filament, case: Scene) -> Iterator[Fault]:
+    """The faults within one filament, which may be one copy of many."""
     yield from _numbers(key, filament)
     yield from _moduli(key, filament)
     yield from check_mass(key, filament, case)
@@ -132,17 +140,51 @@ def _place(key: str, filament: Filament) -> Iterator[Fault]:
     if copies is not None:
         if (copies.count is None) == (copies.file is None):
             found = "neither count nor file" if copies.file is None else "count and file"
-            yield Fault(f"{key}.copies", found, "{count, region} or {file}")
-        elif copies.count is not None and copies.region is None:
-            yield Fault(f"{key}.copies.region", "nothing", "two corners, with count")
-        elif copies.file is not None and not copies.model_fields_set <= {"file", "orientation"}:
-            yield Fault(f"{key}.copies", "file and other keys", "file alone or with orientation, or {count, region}")
+            yield Fault(f"{key}.copies", found, "{count, region}, {count, at} or {file}")
+        elif copies.count is not None and (copies.region is None) == (copies.at is None):
+            found = "nothing" if copies.region is None else "region and at"
+            yield Fault(f"{key}.copies.region", found, "two corners, with count, or at")
+        elif copies.file is not None and not copies.model_fields_set <= _with_file(copies):
+            allowed = "file alone or with orientation, phase, apart, or {count, region}"
+            yield Fault(f"{key}.copies", "file and other keys", allowed)
     if copies is not None and isinstance(filament.shape, RunShape):
         yield Fault(f"{key}.copies", 'copies with shape.kind = "run"', "a filament for each, or another kind of shape")
     if copies is not None and copies.region is not None:
         low, high = copies.region
         if any(a > b for a, b in zip(low, high, strict=True)):
             yield Fault(f"{key}.copies.region", shown(copies.region), "the lower corner first")
+
+
+def _copied(key: str, filament: Filament, case: Scene) -> Iterator[Fault]:
+    """i and phase stand where there are copies, and mean these; phases are of what moves, not of what a rod is."""
+    copies = filament.copies
+    for path, formula in expressions(filament):
+        used = formula.variables & set(COPIED)
+        if path.startswith("copies.") or not used:
+            continue
+        if copies is None:
+            yield Fault(f"{key}.{path}", f"{' and '.join(sorted(used))}, and no copies", f"them with {key}.copies")
+        elif "phase" in used and copies.phase is None:
+            yield Fault(f"{key}.{path}", f"phase, and no {key}.copies.phase", f"{key}.copies.phase beside it")
+        elif "phase" in used and path.partition(".")[0] in _MATERIAL:
+            yield Fault(f"{key}.{path}", "phase", "s, i and parameters: the rod is the same at every phase")
+    if copies is None:
+        return
+    named = [name for name, key_of in (("i", copies.at), ("i", copies.phase), ("phase", copies.phase)) if key_of]
+    for name in dict.fromkeys(named):
+        if name in case.parameters:
+            yield Fault(f"parameters.{name}", f"a parameter named like the {name} of {key}.copies", "another name")
+    if copies.apart is not None and any(key.rpartition(".")[2] in link.names for link in case.links.values()):
+        yield Fault(f"{key}.copies.apart", "a least distance with links", "none where filaments are linked")
+
+
+def _with_file(copies: Copies) -> set[str]:
+    """The keys that go with places from a file: a seed where something is random."""
+    random = copies.phases_drawn or not copies.turned_alike
+    return {"file", "orientation", "phase", "apart"} | ({"seed"} if random else set())
+
+
+_MATERIAL = ("bending", "twisting", "stretching", "radius", "mass", "rotary_inertia")
 
 
 def _shape(key: str, filament: Filament) -> Iterator[Fault]:

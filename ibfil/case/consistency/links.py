@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..copies import copy_name
 from ..expressions import suggestion
 from ..faults import Fault, shown
-from ..filament import Filament, copy_name, single
+from ..filament import Filament, single
 from ..link import AnyLink, Bind, Hinge, Site, Spring
 from ..schema import Scene
 

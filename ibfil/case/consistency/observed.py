@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..copies import copy_name
 from ..expressions import suggestion
 from ..faults import Fault, shown
-from ..filament import copy_name, single
+from ..filament import single
 from ..observe import Observe
 from ..schema import Scene
 
@@ -32,12 +33,22 @@ def _observe(case: Scene) -> Iterator[Fault]:
 
 def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
     filament = single(case.filaments, entry.filament)
+    if entry.over_copies and entry.looks_at == "filament":
+        named = case.filaments.get(entry.filament)
+        if entry.filament and (named is None or named.copies is None):
+            found = f"{shown(entry.copies)} with {shown(entry.filament)}"
+            yield Fault(f"{key}.copies", found, "the name of a filament with copies", (f"{key}.filament", "filament"))
+            return
+        filament = named
+        if entry.of_each and entry.kind in VECTORS and entry.along is None:
+            yield Fault(f"{key}.copies", f'"all" of {entry.kind}, three numbers', f"one number a copy: {key}.along")
     if entry.looks_at != "filament" or any(getattr(entry, other) for other in OTHERS):
         yield from _of_other(key, entry, case)
     elif filament is None and entry.filament in case.filaments:
         if not entry.together:
             found, name = f"{shown(entry.filament)}, which has copies", copy_name(entry.filament, 0)
-            yield Fault(f"{key}.filament", found, f'a copy by its name, "{name}" being the first', ("filament",))
+            allowed = f'a copy by its name, "{name}" being the first; or all of them, with {key}.copies = "mean"'
+            yield Fault(f"{key}.filament", found, allowed, ("filament",))
     elif filament is None and not (entry.together and not entry.filament):
         found = shown(entry.filament) + suggestion(entry.filament, case.filaments) if entry.filament else "nothing"
         yield Fault(f"{key}.filament", found, f"one of {', '.join(case.filaments)}", ("filament",))
@@ -78,6 +89,9 @@ def _scalar(key: str, name: str, case: Scene) -> Iterator[Fault]:
     elif entry.kind in VECTORS and entry.along is None:
         found = f"{shown(name)}, three numbers ({entry.kind})"
         yield Fault(key, found, f"an observable of one number; give observe.{name}.along", reads)
+    elif entry.of_each:
+        found = f"{shown(name)}, a number for each copy"
+        yield Fault(key, found, f'an observable of one number; observe.{name}.copies = "mean"', reads)
 
 
 def _stops(case: Scene) -> Iterator[Fault]:

@@ -56,6 +56,7 @@ class Drivers:
             for path, expression in expressions(filament):
                 if "t" in expression.variables and path not in _SPINS:
                     near = _near(self._model, where) if expression.variables & {"x", "y", "z"} else {"s": s}
+                    near = _of_all_copies(near, self._model.rods.variation(name, expression))
                     largest = 1.0 if path in _ANGLES else np.inf
                     out.append(Drive(prefix + path, expression.tree, _used(expression, near), largest))
         s = np.linspace(0.0, max(f.length for f in self._model.case.filaments.values()), PLACES)
@@ -75,9 +76,13 @@ class Drivers:
     @cached_property
     def spins(self) -> dict[str, Expression]:
         """The ends that spin: key -> rate."""
+        rods, found = self._model.rods, {}
+        for name, table, filament in zip(rods.names, rods.tables, rods.filaments, strict=True):
+            whole = self._model.case.filaments[table]
+            found[table if filament is whole else name] = filament
         return {
             f"filament.{name}.{side}.{key}": turning.spin
-            for name, filament in self._model.case.filaments.items()
+            for name, filament in found.items()
             for side, end in (("start", filament.start), ("finish", filament.finish))
             for key, turning in (("spin", end), ("motor.spin", end.motor))
             if turning is not None and turning.spin is not None and turning.spin.constant != 0.0
@@ -168,6 +173,15 @@ def _sampled(drive: Drive) -> list[Sampled]:
     if drive.key.endswith(_ANGLES) or ".turns." in drive.key:
         return [(("cos", drive.tree), {}), (("sin", drive.tree), {})]
     return [(drive.tree, drive.places)]
+
+
+def _of_all_copies(near: Mapping[str, np.ndarray], values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Places along a filament at every copy of it: each place with the i and phase (k,) of each copy."""
+    if not values:
+        return dict(near)
+    places, copies = len(next(iter(near.values()))), len(next(iter(values.values())))
+    out = {name: np.tile(at, copies) for name, at in near.items()}
+    return out | {name: np.repeat(given, places) for name, given in values.items()}
 
 
 def _used(expression: Expression, near: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

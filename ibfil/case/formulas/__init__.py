@@ -1,0 +1,1 @@
+"""Trees of checked expressions, and functions of arrays made of them."""
