@@ -13,6 +13,7 @@ NAME, HELP = "check", "run nothing: what is modelled, sizes, stable steps, estim
 def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     add_case(command)
+    command.add_argument("--rest", action="store_true", help="say too whether the scene is stable where it rests")
 
 
 def do(arguments: argparse.Namespace) -> int:
@@ -21,4 +22,8 @@ def do(arguments: argparse.Namespace) -> int:
     from ..check.report import report
 
     tell(report(case))
+    if arguments.rest:
+        from ..studies.modes.verdict import at_rest
+
+        tell("\n".join(["", "at rest:", *(f"  {line}" for line in at_rest(case))]))
     return DONE

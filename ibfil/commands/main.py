@@ -19,11 +19,11 @@ from ..screen import let_go, lost, prepare, warn
 from ..version import __version__
 from . import bench, cases, check, new, page, render, run, schema, show, verify, vtk, warm
 from .arguments import BAD_INPUT, CUT, FAILED
-from .studies import compare, modes, rest, stability, sweep, trade, uncertainty
+from .studies import compare, modes, rest, stability, sweep, trade, tune, uncertainty
 
 COMMANDS = (
     *(run, check, new, cases, schema, show, vtk, render, page),
-    *(sweep, uncertainty, trade, compare, stability, rest, modes, verify, bench, warm),
+    *(sweep, uncertainty, tune, trade, compare, stability, rest, modes, verify, bench, warm),
 )
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 

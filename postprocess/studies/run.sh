@@ -11,7 +11,7 @@ study() { name=$1; shift; echo "== $name"; ibfil "$@" -o "$out/$name" || [ $? -e
 # The step of the case is that of the coarsest reference level.
 study swimmer_trade trade swimmer_stokes output.grid_every=1.885 time.step=0.0031416 output.every=0.031416 --vary \
 'time.scheme=implicit,implicit,implicit,implicit,implicit,implicit,implicit,implicit,implicit,implicit,semi-implicit,semi-implicit,semi-implicit,semi-implicit,semi-implicit,explicit,explicit&time.order=2,2,2,2,2,1,1,1,1,1,1,1,1,1,1,1,1&time.step=0.031416,0.015708,0.007854,0.003927,0.0019635,0.031416,0.015708,0.007854,0.003927,0.0019635,0.031416,0.015708,0.007854,0.003927,0.0019635,0.0001,0.000018' \
-    --observe position,speed --clock processor --for 1e-3
+    --observe position,speed --clock processor
 
 # Ways to the same velocity, and how nodes are placed: kernels, precision, method.
 study method_trade trade swimmer_stokes output.grid_every=1.885 'fluid.cells=[64,64,64]' filament.swimmer.nodes=21 output.every=0.031416 \
@@ -48,6 +48,10 @@ study explicit stability swimmer_rft time.end=0.01 output.every=0.002 time.schem
 
 # An error bar on the swimmer's speed, and where it comes from.
 study swimmer_uncertainty uncertainty swimmer_stokes --meant
+
+# The cheapest step and nodes: for growth and frequency of a flailing rod, for the speed of the swimmer.
+study flailing_tune tune flailing --for growth=5% --for frequency=1%
+study swimmer_tune tune swimmer_stokes --for speed=2%
 
 # Flutter of a clamped rod under a follower force: the threshold in resistive-force theory, and on grids in free space and in a box,
 # of rods 18, 27 and 36 hydrodynamic radii long. flutter.py draws them together.

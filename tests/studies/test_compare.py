@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -11,9 +12,13 @@ import pytest
 from ibfil.case.reading import parse_case
 from ibfil.commands import main
 from ibfil.errors import CaseError, RunFailed
+from ibfil.io.reader import RunFile
 from ibfil.studies.compare.fluids import fluid_overrides, known_fluids
 from ibfil.studies.compare.quantities import Window, quantities, quantity
 from ibfil.studies.compare.study import choose_window, compare
+from ibfil.studies.member import Member
+from ibfil.studies.members import run_members
+from ibfil.studies.uncertainty.study import uncertainty
 
 SWIMMER = """
 title = "A small swimmer"
@@ -196,3 +201,63 @@ def test_where_no_run_ends_there_is_nothing_to_compare(tmp_path):
     wild = ["time.scheme=explicit", "time.step=0.01", "filament.rod.stretching=1e7"]
     with pytest.raises(RunFailed, match="no fluid's run came to an end"):
         compare(SWIMMER, ("rft", "stokes"), tmp_path, wild, log=lambda line: None)
+
+
+SWIM = '[observe.swim]\nkind = "drift"\nat = "centroid"\nalong = [1, 0, 0]\n'
+LONGER = (
+    SWIMMER.replace('end = "4*pi/10"', 'end = "6*pi/10"').replace("bending = 1.0", "bending = 1.0\nradius = 0.02")
+    + SWIM
+)
+
+
+def sources_are_those_of_uncertainty(column, case, folder, *overrides):
+    """Step, nodes and place have the estimates of `ibfil uncertainty` of the same number."""
+    (other,) = uncertainty(case, folder, overrides, log=quiet).bars
+    found = column.numbers["observed: swim"]
+    assert found.value == other.value
+    for mine in found.sources:
+        assert mine.estimate == next(one.estimate for one in other.sources if one.name == mine.name)
+    return {one.name for one in found.sources}
+
+
+def test_bars_of_rows_are_those_of_uncertainty_and_cover_a_run_much_finer(tmp_path, capsys):
+    path = tmp_path / "s.toml"
+    path.write_text(LONGER)
+    whole = compare(str(path), ("rft", "slender"), tmp_path / "both", bars=True, log=quiet)
+    rft = whole.columns[0].numbers
+    names = sources_are_those_of_uncertainty(whole.columns[0], LONGER, tmp_path / "rft", "fluid.model=rft")
+    assert names == {"step", "nodes"} == {one.name for one in rft["speed"].sources}
+    finer = ("fluid.model=rft", "time.step=pi/800", "filament.rod.nodes=97")
+    outcome = run_members([Member("fine", LONGER, finer)], tmp_path, log=quiet)[0]
+    with RunFile(outcome.path) as run:
+        fine = quantities(run, whole.window)
+    for key in ("speed", "velocity x", "power of the nodes"):
+        assert abs(rft[key].value - fine[key].value) < rft[key].bar
+        assert rft[key].bar < 5 * abs(rft[key].value - fine[key].value)
+    with (tmp_path / "both" / "compare.csv").open(newline="") as file:
+        rows = {row["quantity"]: row for row in csv.DictReader(file)}
+    assert float(rows["speed"]["rft bar"]) == rft["speed"].bar
+    assert rows["steps"]["rft bar"] == ""
+    command = ["compare", str(path), "--fluids", "rft,slender", "-o", str(tmp_path / "both"), "--bars"]
+    assert main.main(command) == 0  # nothing is run again
+    out = capsys.readouterr().out
+    assert "+- the bar of step, nodes and place in a cell" in out
+    assert "distance from the first, rms/L" in out
+    assert re.search(r"the same without rigid motion +- +[\d.e-]+ \(scatter ", out)  # no bar, of what is of two runs
+    assert (tmp_path / "both" / "compare.png").stat().st_size > 10_000
+    hot = ["thermal.energy=1e-6", "thermal.seed=1", "filament.rod.curvature=[0, 0]"]
+    assert main.main([*command, *hot]) == 2
+    assert "[thermal]: found thermal noise; allowed: none with --bars" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_bars_of_rows_on_a_grid_have_the_place_in_a_cell(tmp_path):
+    whole = compare(LONGER, ("stokes", "rft"), tmp_path / "both", bars=True, log=quiet)
+    names = sources_are_those_of_uncertainty(whole.columns[0], LONGER, tmp_path / "stokes")
+    assert (
+        names == {"step", "nodes", "place in a cell"} == {one.name for one in whole.columns[0].numbers["speed"].sources}
+    )
+
+
+def quiet(line):
+    """Say nothing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -177,3 +178,24 @@ def test_errors_are_those_of_python_too():
         study.modes("swimmer_rft", None, [], log=silent)
     with pytest.raises(RunFailed):
         rest.rest("flailing", "nowhere", ["filament.rod.nodes=17"])
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (["flailing"], r"UNSTABLE: bending at the angular frequency 15\.3\d* grows by a factor e in 5\.4"),
+        (
+            ["flailing", "parameters.F0=30"],
+            r"stable: the slowest mode, bending at the angular frequency [\d.]+, decays",
+        ),
+        (["swimmer_rft"], r"not known: .*curvature: found a function of t"),
+    ],
+)
+def test_check_says_on_request_whether_a_scene_is_stable_at_rest(words, found, capsys):
+    """Flutter sets in at F0 = 37.7; at 38 the growth is 2.241/(4 pi), e-fold 5.6 at 191.26/(4 pi), on 65 nodes 5.4."""
+    from ibfil.commands.main import main
+
+    assert main(["check", *words, "--rest"]) == 0
+    assert re.match(rf"at rest:\n  {found}", capsys.readouterr().out.split("\n\n")[-1])
+    assert main(["check", *words]) == 0
+    assert "at rest:" not in capsys.readouterr().out

@@ -52,3 +52,10 @@ def test_what_was_measured_says_when_with_what_and_where(path):
     assert {"ibfil", "python", "numpy"} <= set(message["versions"])
     assert "cores" in message["machine"]
     assert not re.search(r'"[^"]*/(tmp|home|work)/', path.read_text())
+
+
+def test_the_error_bar_of_the_swimmer_took_at_most_twelve_of_its_runs():
+    """As recorded by the study, in processor time of one sitting; run.sh measures it again."""
+    message = json.loads((HERE / "results" / "swimmer_uncertainty.json").read_text())
+    assert message["cost_in_base_runs"] <= 12
+    assert message["failures"] == []

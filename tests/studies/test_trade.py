@@ -67,11 +67,11 @@ def test_its_own_estimate_is_that_of_a_run_much_finer(proved, tmp_path):
         left = reference.distances(ours, finer)
     for name in ("position", "span"):
         proof = proved.proofs[name][1]
-        assert proof.estimate == pytest.approx(left[name] * 16 / 15, rel=abs(2**proof.order - 4) / 3)
+        assert proof.error == pytest.approx(left[name] * 16 / 15, rel=abs(2**proof.order - 4) / 3)
 
 
 def test_a_reference_without_its_order_is_refused(tmp_path, monkeypatch):
-    """Distances that fall by 1.9 a level are order 0.93, less than 0.7 of two; by 3, order 1.6, enough."""
+    """Distances that fall by 1.9 a level are order 0.93, less than 0.65 of two; by 3, order 1.6, enough."""
     for ratio, refused in ((1.9, ("position",)), (3.0, ())):
         falls = iter(ratio ** -np.arange(100.0))
         monkeypatch.setattr(reference, "distances", lambda a, b, falls=falls: {"position": next(falls)})
@@ -105,7 +105,9 @@ VARY = ["--vary", "time.step=5e-3,1e-3", "--vary", "time.scheme=implicit,explici
 def test_a_trade_has_a_table_a_figure_and_ends_with_the_cheapest(here, capsys):
     command = ["trade", "bent.toml", "time.end=0.1", *VARY, "--repeat", "2", "--observe", "position", "-o", "out"]
     assert main.main([*command, "--for", "0.01"]) == 0
-    *_, last = capsys.readouterr().out.splitlines()
+    said = capsys.readouterr()
+    assert "trade --for is deprecated; ibfil tune bent.toml --for OBSERVABLE=1%" in said.err
+    *_, last = said.out.splitlines()
     assert last.split() in (["time.step=5e-3", *IMPLICIT], ["time.step=1e-3", *IMPLICIT])
     with open("out/trade.csv", newline="") as file:
         rows = {(row["time.step"], row["time.scheme"]): row for row in csv.DictReader(file)}

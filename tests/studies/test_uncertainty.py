@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from helpers.calibration import CLAMPED, RFT, TIP, Z, cube, rod, seen, until
 
+from ibfil.case.reading import parse_case
 from ibfil.commands.main import main
 from ibfil.errors import CaseError, RunFailed
+from ibfil.simulation.simulation import Simulation
 from ibfil.studies.estimates import estimate
-from ibfil.studies.uncertainty import levels, study
+from ibfil.studies.uncertainty import levels, place, study
 from ibfil.studies.uncertainty.results import Source
 from ibfil.studies.uncertainty.study import uncertainty
 
@@ -147,3 +149,17 @@ def test_refusals(tmp_path):
         uncertainty(bare, tmp_path)
     with pytest.raises(CaseError, match="--observe: found top; allowed: tip, aside"):
         uncertainty(SWAY, tmp_path, observe=["top"])
+
+
+def test_a_scene_moved_as_a_whole_feels_what_it_felt():
+    """Springs to places in the lab, of ends and of links, go with it; left behind they would pull."""
+    ends = "[filament.rod.start]\nspring = { stiffness = 3.0, to = [0.1, 0.2, 0.0] }\n"
+    sites = '[{ filament = "rod", at = "finish" }, { point = [1.2, 0.1, 0.3] }]'
+    tied = f"[link.tie]\nbetween = {sites}\nstiffness = 5.0\nrest = 0.1\n"
+    simulation = Simulation(parse_case(rod(17, 1e3, ends=ends) + RFT + until(0.5, 0.02, 0.05) + tied, "tied.toml"))
+    shift = np.array([0.3, -0.2, 0.7])
+    there = Simulation(parse_case(simulation.case.text, "moved.toml", place.moved(simulation, shift)))
+    here, moved = (one.snapshot().filaments["rod"] for one in (simulation, there))
+    assert np.abs(here.force).max() > 0.1
+    assert moved.position == pytest.approx(here.position + shift, abs=1e-12)
+    assert moved.force == pytest.approx(here.force, abs=1e-9)

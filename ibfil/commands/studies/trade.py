@@ -29,7 +29,7 @@ def add(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--budget", type=duration, metavar="10m", help="stop after this time: 90s, 10m, 2h")
     command.add_argument(
-        "--for", dest="wanted", type=positive, metavar="1e-3", help="end with the cheapest for this error"
+        "--for", dest="wanted", type=positive, metavar="1e-3", help="deprecated: ibfil tune CASE --for OBSERVABLE=1%%"
     )
 
 
@@ -58,6 +58,9 @@ def do(arguments: argparse.Namespace) -> int:
     tell(f"{folder / study.TABLE}, {study.DETAILS}, {study.FIGURE}")
     if arguments.wanted is None:
         return 0
+    warn(
+        f"ibfil: trade --for is deprecated; ibfil tune {arguments.words[0]} --for OBSERVABLE=1% chooses step and nodes"
+    )
     best = result.cheapest(arguments.wanted)
     if best is None:
         return _none_within(result, arguments.wanted)

@@ -128,6 +128,7 @@ def _numbers(axes: Axes, result: Comparison, looks: Looks) -> None:
         return known and abs(first[key].value) > max(_NEAR_ZERO * of_kind, _NOISE * largest)
 
     names = [key for key in names if counts(key)][:9]
+    barred = any(one.sources for column in columns for one in column.numbers.values())
     step = 0.6 / max(len(columns) - 1, 1)
     for i, column in enumerate(columns):
         colour = looks[column.fluid][0]
@@ -137,7 +138,7 @@ def _numbers(axes: Axes, result: Comparison, looks: Looks) -> None:
                 continue
             y = row + (i - 0.5 * (len(columns) - 1)) * step
             scale = first[key].value
-            error = abs((found.error or 0.0) / scale)
+            error = abs(((found.bar if barred else found.error) or 0.0) / scale)
             axes.errorbar(found.value / scale, y, xerr=error, fmt=MARKS[i % len(MARKS)], color=colour, ms=5, capsize=2)
     axes.axvline(1.0, color="0.8", lw=0.8, zorder=0)
     axes.set_yticks(range(len(names)), [textwrap.fill(name, 20) for name in names])
@@ -145,4 +146,5 @@ def _numbers(axes: Axes, result: Comparison, looks: Looks) -> None:
     count, what = (
         (result.window.count, "parts" if result.window.why else "periods") if result.window else (0, "periods")
     )
-    axes.set_xlabel(f"over that of {columns[0].fluid}\n(mean of {count} {what}; bars: standard error)")
+    bars = "step, nodes, place" if barred else "standard error"
+    axes.set_xlabel(f"over that of {columns[0].fluid}\n(mean of {count} {what}; bars: {bars})")

@@ -11,11 +11,13 @@ from ...io.units import label
 from ...observables import time_series
 from ...observables.time_series import trapezoid_weights
 from ..distance import common_outputs, rms, rms_of_shape
+from ..estimates import combined
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from ...io.reader import RunFile
+    from ..uncertainty.results import Source
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,25 @@ class Window:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number, its standard error from the scatter between periods (None with fewer than two), and its unit."""
+    """A number, its standard error from the scatter between periods (None with fewer than two), and its unit.
+
+    ``sources`` are those of its numerical errors, where they were looked for.
+    """
 
     value: float
     error: float | None
     unit: str
+    sources: tuple[Source, ...] = ()
+
+    @property
+    def bar(self) -> float | None:
+        """The bar of step, nodes and place, as in ../uncertainty; None where one of them is not known."""
+        told = [one.estimate for one in self.sources]
+        known = [one for one in told if one is not None and np.isfinite(one.doubt)]
+        if not told or len(known) < len(told):
+            return None
+        error, doubt = combined(known)
+        return abs(error) + doubt
 
 
 def quantity(values: np.ndarray, unit: str) -> Quantity:

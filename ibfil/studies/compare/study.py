@@ -21,8 +21,11 @@ from ...io.reader import RunFile
 from ...screen import tell
 from ..member import Member, Outcome
 from ..members import run_members
+from ..runs import Runs
 from ..settings import source
-from ..tables import measured, numbers, refuse_strangers, write_csv, write_json
+from ..tables import measured, refuse_strangers, write_csv, write_json
+from ..uncertainty.files import row as source_row
+from .bars import OBSERVED, observed, with_bars
 from .fluids import fluid_overrides, known_fluids
 from .quantities import Quantity, Window, quantities
 from .results import Column, Comparison
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
 
 
 TABLE, DETAILS, FIGURE = "compare.csv", "compare.json", "compare.png"
+LEVELS = "levels"  # the folder of the runs that bars are told from
 BLOCKS = 4  # parts of the second half of a run without a period
 _SLACK = 1e-6  # of a period: rounding
 _TRANSIENT = 1 / 3  # of a run, at least, and a whole period
@@ -64,6 +68,7 @@ def compare(
     *,
     period: float | None = None,
     transient: float | None = None,
+    bars: bool = False,
     jobs: int = 1,
     executor: Executor | None = None,
     log: Log = tell,
@@ -72,11 +77,14 @@ def compare(
 
     ``period`` is by default that of all that drives the scene; where it has none, the second half of the run is cut
     into four parts, whose scatter is the uncertainty. ``transient`` is what is left out at the start, by default a
-    third of the run, at least a period, and until a soft start is over. Raises CaseError, before anything runs where
-    no period would be left, RunFailed where no run came to an end, Interrupted.
+    third of the run, at least a period, and until a soft start is over. ``bars`` runs each fluid at other levels of
+    step and nodes too, and on a grid half a cell aside. Raises CaseError, before anything runs where no period would
+    be left, RunFailed where no run came to an end, Interrupted.
     """
     folder, (base, members) = Path(folder), _members(case, overrides, fluids)
     refuse_strangers(folder, DETAILS, TABLE, FIGURE)
+    if bars and base.thermal is not None:
+        raise CaseError([f"{base.file}: [thermal]: found thermal noise; allowed: none with --bars (ibfil uncertainty)"])
     choose_window(base, base.time.end, period, transient)
     outcomes = run_members(members, folder, jobs=jobs, executor=executor, log=log)
     if not any(outcome.done for outcome in outcomes):
@@ -87,7 +95,11 @@ def compare(
         window = choose_window(next(iter(runs.values())).case, end, period, transient)
         own = only_here({name: run.case for name, run in runs.items()})
         first = next(iter(runs))
-        columns = tuple(_column(one, runs, first, window, own) for one in outcomes)
+
+        def runs_of(name: str, inner: ExitStack) -> Runs:
+            return Runs(folder / LEVELS / name, jobs, executor, lambda line: log(f"{name}, {line}"), inner)
+
+        columns = tuple(_column(one, runs, first, window, own, runs_of if bars else None) for one in outcomes)
         title = next(iter(runs.values())).case.title
         result = Comparison(title, window, columns, measured())
         _write(result, folder, runs)
@@ -95,7 +107,12 @@ def compare(
 
 
 def _column(
-    outcome: Outcome, runs: Mapping[str, RunFile], first: str, window: Window, own: Mapping[str, tuple[str, ...]]
+    outcome: Outcome,
+    runs: Mapping[str, RunFile],
+    first: str,
+    window: Window,
+    own: Mapping[str, tuple[str, ...]],
+    runs_of: Callable[[str, ExitStack], Runs] | None,
 ) -> Column:
     from ...check.report import share_lines
     from ...simulation.simulation import Simulation
@@ -105,19 +122,15 @@ def _column(
         return Column(name, outcome, "", {}, (), ())
     run = runs[name]
     found = quantities(run, window, None if name == first else runs[first])
-    found |= {f"observed: {key}": Quantity(value, None, "") for key, value in _observed(run).items()}
+    found |= {OBSERVED + key: Quantity(value, None, "") for key, value in observed(run).items()}
+    if runs_of is not None:
+        found = with_bars(found, outcome, window, runs_of)
     seconds, _, covered = run.pace
     unit = "s" if run.case.units.time == "1" else f"s/{run.case.units.time}"
     if covered > 0:
         found["wall time a unit of time"] = Quantity(seconds / covered, None, unit)
     found["steps"] = Quantity(float(run.steps), None, "1")
     return Column(name, outcome, run.method, found, own[name], tuple(share_lines(Simulation(run.case))))
-
-
-def _observed(run: RunFile) -> dict[str, float]:
-    """The case's own observables but for the dissipation, which has its rows."""
-    heat = run.case.dissipation_observed
-    return {key: value for key, value in numbers(run).items() if key not in heat}
 
 
 def choose_window(case: Case, end: float, period: float | None, transient: float | None) -> Window:
@@ -178,6 +191,8 @@ def rows(result: Comparison) -> list[dict[str, Any]]:
                 column.fluid: None if found is None else found.value,
                 f"{column.fluid} +-": None if found is None else found.error,
             }
+            if any(one.sources for one in column.numbers.values()):
+                row[f"{column.fluid} bar"] = None if found is None else found.bar
         out.append(row)
     return out
 
@@ -197,11 +212,18 @@ def details(result: Comparison) -> dict[str, Any]:
                 "method": column.method,
                 "models_alone": column.own,
                 "shares": column.shares,
-                "numbers": {name: asdict(found) for name, found in column.numbers.items()},
+                "numbers": {name: _number(found) for name, found in column.numbers.items()},
             }
             for column in result.columns
         ],
     }
+
+
+def _number(found: Quantity) -> dict[str, Any]:
+    out: dict[str, Any] = {"value": found.value, "error": found.error, "unit": found.unit}
+    if found.sources:
+        out |= {"bar": found.bar, "sources": [source_row(one) for one in found.sources]}
+    return out
 
 
 def _write(result: Comparison, folder: Path, runs: Mapping[str, RunFile]) -> None:

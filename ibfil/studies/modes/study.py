@@ -64,7 +64,7 @@ def modes(
     motion = scene.motion(rest.configuration)
     step = scene.simulation.step_length if step is None else step
     shape = Shape(scene, rest.configuration)
-    found, zeros, left_out = _found(scene, motion, shape, count, step)
+    found, zeros, left_out = own_modes(scene, motion, shape, count, step)
     levels = [scene if not over else scene_of(whole, (*overrides, *over)) for over in node_levels(own)]
     found, lost = _with_bars(found, levels, own_level(own), rest)
     limit = None if critical is None else threshold(whole, overrides, *critical, log)
@@ -87,7 +87,7 @@ def modes(
     return out
 
 
-def _found(
+def own_modes(
     scene: SceneAtRest, motion: LinearMotion, shape: Shape, count: int, step: float
 ) -> tuple[list[Mode], int, int]:
     """The modes at the case's own nodes, how many neither grow nor decay, and how many are no modes of a real rod."""

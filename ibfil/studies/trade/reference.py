@@ -1,10 +1,10 @@
 """The reference of `ibfil trade`: a finer run that proves itself before anything is held against it.
 
 Time and space are refined apart from the case's own resolution, each twice: steps h, h/2, h/4 at the case's nodes,
-and nodes N, 2N - 1, 4N - 3 at the step h. With the distances d1 of the first two runs of each and d2 of the last two,
-the observed order is log2(d1/d2). Below 0.7 of the nominal one it is no order: the levels of what is varied are
-refined further, and where that does not help the measure is refused. The rest of the error in the finest level is
-d2/(2^p - 1), p the observed order or the nominal one, whichever is less.
+and nodes N, 2N - 1, 4N - 3 at the step h. The distances d1 of the first two runs of each and d2 of the last two give
+the order and what is left of the error in the finest, by the rule of all studies (../estimates.py): levels that are
+d1 + d2, d2 and 0 from the finest. Where the order is not seen, the levels of what is varied are refined further, and
+where that does not help the measure is refused.
 
 The reference has the finest step; and the finest nodes where nodes are varied. Where they are not, it has the case's,
 and what the refinement shows is what the nodes themselves cost: `Reference.of_nodes`.
@@ -25,6 +25,7 @@ import numpy as np
 from ...errors import CaseError, RunFailed
 from ...io.reader import RunFile
 from ..distance import rms
+from ..estimates import estimate
 from ..member import Member, Outcome
 from ..settings import source
 from ..tables import observed
@@ -34,9 +35,7 @@ if TYPE_CHECKING:
 
 
 NOMINAL = 2.0  # order of BDF2 in time, and of the finite volumes in space, ends included
-ENOUGH = 0.7  # of the nominal order
 MORE = 1  # further levels, where the order is not seen
-ROUND_OFF = 1e-10  # a distance that no refinement needs to lessen
 POSITION = "position"  # the measure that every run has
 
 Run = Callable[[Sequence[Member], Path], list[Outcome]]
@@ -49,13 +48,20 @@ class Proof:
     direction: str  # time | space
     levels: tuple[str, ...]
     distances: tuple[float, float]
-    order: float
-    estimate: float  # of the error left in the finest level
+    word: str  # what the levels show, as in ../estimates.py
+    order: float | None
+    error: float  # left in the finest level
+    doubt: float  # of that
 
     @property
     def holds(self) -> bool:
-        """Whether the observed order is near enough to the nominal one."""
-        return self.distances[1] <= ROUND_OFF or self.order >= ENOUGH * NOMINAL
+        """Whether the order is seen, or a higher one, or there is nothing left but round-off."""
+        return self.word in ("seen", "fast", "round-off")
+
+    @property
+    def estimate(self) -> float:
+        """The bar of the finest level: its error and the doubt of that."""
+        return self.error + self.doubt
 
 
 @dataclass(frozen=True)
@@ -161,10 +167,10 @@ def _refine(levels: Levels, direction: str, measures: Sequence[str], more: int) 
             before, after = distances(coarse, middle), distances(middle, fine)
         for name in measures:
             d = (before[name], after[name])
-            order = float(np.log2(d[0] / d[1])) if d[0] > 0 and d[1] > 0 else float("inf")
-            certain = max(min(order, NOMINAL), 0.1)  # an estimate is wanted also where there is no order
+            # Distances are shares, of a length or a number: round-off is told by one.
+            told = estimate((d[0] + d[1], d[1], 0.0), (4.0, 2.0, 1.0), NOMINAL, level=2, scale=1.0)
             names = tuple(levels.member(*level).name for level in at)
-            proofs[name] = Proof(direction, names, d, order, d[1] / (2**certain - 1))
+            proofs[name] = Proof(direction, names, d, told.word, told.order, abs(told.error), told.doubt)
         if all(proof.holds for proof in proofs.values()):
             break
     return first + 2, proofs

@@ -25,7 +25,7 @@ from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import Axis, Setting, combinations, source
 from ..tables import measured, refuse_strangers, study_members, write_csv, write_json
-from .reference import NOMINAL, POSITION, Reference, distances, prove
+from .reference import NOMINAL, POSITION, Proof, Reference, distances, prove
 from .results import Trade, Trial
 
 if TYPE_CHECKING:
@@ -110,8 +110,8 @@ def _proved(reference: Reference, asked: Sequence[str], log: Log) -> tuple[str, 
     for name in asked:
         for proof in reference.proofs[name]:
             log(
-                f"reference, {name} in {proof.direction}: order {proof.order:.2f} (nominal {NOMINAL:g}), "
-                f"error left {proof.estimate:.2g}"
+                f"reference, {name} in {proof.direction}: {_words(proof)}, error left {proof.error:.2g}, "
+                f"doubt {proof.doubt:.2g}"
             )
     for name in reference.refused:
         log(f"{name} is refused: its order is not seen, so the reference proves nothing of it")
@@ -122,6 +122,12 @@ def _proved(reference: Reference, asked: Sequence[str], log: Log) -> tuple[str, 
             advice="begin with a shorter time.step (and more nodes, where they are varied), or take other measures",
         )
     return kept
+
+
+def _words(proof: Proof) -> str:
+    """The levels in words, as `ibfil uncertainty` has them."""
+    order = "" if proof.order is None else f"order {proof.order:.2f} ({NOMINAL:g})"
+    return order if proof.word == "seen" else f"{proof.word}, {order}".removesuffix(", ")
 
 
 @contextmanager

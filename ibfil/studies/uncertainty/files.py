@@ -25,10 +25,11 @@ def write(result: Uncertainty, folder: Path) -> None:
 
 def rows(result: Uncertainty) -> list[dict[str, Any]]:
     """The table: a row a number and source."""
-    return [{"observable": bar.name, "value": bar.value, **_row(one)} for bar in result.bars for one in bar.sources]
+    return [{"observable": bar.name, "value": bar.value, **row(one)} for bar in result.bars for one in bar.sources]
 
 
-def _row(source: Source) -> dict[str, Any]:
+def row(source: Source) -> dict[str, Any]:
+    """A source of error, as the table has it."""
     told = source.estimate
     out: dict[str, Any] = {"source": source.name, "kind": "numerical" if source.numerical else "choice"}
     if told is not None:
@@ -63,7 +64,7 @@ def _number(bar: Bar) -> dict[str, Any]:
         "no_number": bar.nothing,
         "halves_of_its_window": bar.halves,
         "sources": [
-            {**_row(one), "sizes": None if one.estimate is None else asdict(one.estimate)["sizes"]}
+            {**row(one), "sizes": None if one.estimate is None else asdict(one.estimate)["sizes"]}
             for one in bar.sources
         ],
     }

@@ -31,7 +31,8 @@ _NAMES = {-1: "coarse", 1: "fine", 2: "finest"}
 class Direction(NamedTuple):
     """A direction of refinement: its name, nominal order, whether it has a coarser level, its overrides by level.
 
-    ``size`` is what falls along it, of a run; ``under`` are the overrides of all its levels, the base's own included.
+    ``size`` is what falls along it, of a run; ``under`` are the overrides of all its levels, the base's own included;
+    ``finest``: whether a second finer level tells more where the first shows no order.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Direction(NamedTuple):
     size: Callable[[RunFile], float]
     words: Callable[[RunFile], str]
     under: tuple[str, ...] = ()
+    finest: bool = True
 
 
 class Base:
@@ -119,7 +121,9 @@ def nodes(base: Base, under: tuple[str, ...]) -> Direction:
         return tuple(f"filament.{name}.nodes={count(n, level)}" for name, n in counts.items())
 
     coarser = min(count(n, -1) for n in counts.values()) >= FEWEST
-    return Direction("nodes", 2.0, coarser, overrides, _segment, _node_words, under or base.same_step)
+    # On a grid more nodes scatter, and do not show an order sooner: the dearest run of all would tell nothing.
+    finest = not base.case.fluid.on_grid
+    return Direction("nodes", 2.0, coarser, overrides, _segment, _node_words, under or base.same_step, finest)
 
 
 def _segment(run: RunFile) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -38,6 +38,26 @@ def own(name: str, observables: Iterable[str]) -> str:
     return name if name in known else name[:-2]
 
 
+class Numbered(Protocol):
+    """Numbers of a run, and the same of other runs of its scene."""
+
+    def numbers(self) -> Numbers:
+        """They themselves."""
+        ...
+
+    def of(self, run: RunFile) -> Numbered:
+        """The same of another run."""
+        ...
+
+    def back(self, run: RunFile, shift: np.ndarray) -> Numbers:
+        """The same of a run whose rods stand ``shift`` (3,) aside, as if they did not."""
+        ...
+
+    def scales(self) -> Numbers:
+        """The sizes by which round-off is told, of numbers that vanish too."""
+        ...
+
+
 class Recorded:
     """The observables of a run and their series."""
 
@@ -50,6 +70,11 @@ class Recorded:
     def of(self, run: RunFile) -> Recorded:
         """The same observables of another run."""
         return Recorded(run, tuple(self.observables))
+
+    def back(self, run: RunFile, shift: np.ndarray) -> Numbers:
+        """The numbers of a run whose rods stand ``shift`` (3,) aside, as if they did not."""
+        known = moved_back(run, shift)
+        return {key: known[key] for key in self.numbers()}
 
     def numbers(self, every: int = 1) -> Numbers:
         """The summaries; with ``every`` above 1 from each so many outputs only, counted back from the last."""

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...case.link import Spring
 from ...errors import CaseError
 
 if TYPE_CHECKING:
     from ...case.expressions import Expression
+    from ...case.link import Site
     from ...case.schema import Case
     from ...simulation.simulation import Simulation
 
@@ -57,6 +59,9 @@ def _tied(case: Case, shift: np.ndarray) -> Iterator[str]:
     """The overrides of flows, loads and springs that are tied to places."""
     if case.fluid.flow is not None:
         yield f"fluid.flow={_elsewhere(case.fluid.flow, shift)}"
+    for name, link in case.links.items():
+        if isinstance(link, Spring) and any(site.point is not None for site in link.between):
+            yield f"link.{name}.between=[{', '.join(_site(site, shift) for site in link.between)}]"
     for name, filament in case.filaments.items():
         for side, end in (("start", filament.start), ("finish", filament.finish)):
             if end.spring is not None:
@@ -69,6 +74,14 @@ def _tied(case: Case, shift: np.ndarray) -> Iterator[str]:
         if loads.tether is not None and loads.tether.places is not None:
             to = [f"({e.text}) + ({float(d)!r})" for e, d in zip(loads.tether.places, shift, strict=True)]
             yield f"filament.{name}.loads.tether.to={to}"
+
+
+def _site(site: Site, shift: np.ndarray) -> str:
+    """A place that a link holds on to: one of the lab moves with the scene."""
+    if site.point is not None:
+        return f"{{point = {[float(x) for x in np.array(site.point) + shift]}}}"
+    at = f'"{site.at}"' if isinstance(site.at, str) else repr(site.at)
+    return f'{{filament = "{site.filament}", at = {at}}}'
 
 
 def _elsewhere(formulas: tuple[Expression, ...], shift: np.ndarray) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..estimates import Estimate, estimate
 from .levels import Base, Direction, level_member
-from .numbers import Numbers, Recorded
+from .numbers import Numbered, Numbers
 from .results import Source
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ class Ladder:
     def __init__(
         self,
         base: Base,
-        recorded: Recorded,
+        recorded: Numbered,
         make: Callable[[Sequence[Member]], None],
         run: Callable[[Member], RunFile | None],
         why: Callable[[Member], str],
@@ -37,7 +37,7 @@ class Ladder:
         first = FINE if fine or not direction.coarser else COARSE
         self._make([*(self._member(direction, k) for k in first), *beside])
         settled = first == COARSE and self._settled(direction)
-        if not settled and first == COARSE:
+        if not settled and first == COARSE and direction.finest:
             self._make([self._member(direction, 2)])
         return settled
 

@@ -15,85 +15,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import CaseError, RunFailed
-from ...io.reader import RunFile
 from ...io.units import label
 from ..estimates import Estimate
-from ..member import Member, Outcome
-from ..members import run_members
+from ..member import Member
+from ..runs import Runs, spent
 from ..settings import source
 from ..tables import measured
 from . import levels, sampling
+from .discretisation import Found, refined
 from .files import write
 from .levels import Base
-from .numbers import Recorded, moved_back, own
-from .refinement import Ladder
+from .numbers import Recorded, own
 from .results import Bar, Source, Uncertainty
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ...case.schema import Case
 
 RUNS = "runs"
 SINGLE = 1e-8  # of a number: what single precision changes (measured: 7e-9 to 1.6e-8 of speeds)
 
 Log = Callable[[str], object]
-
-
-class _Study:
-    """The runs of one study, made when they are asked for; equal cases are one run."""
-
-    def __init__(self, folder: Path, jobs: int, executor: Executor | None, log: Log, stack: ExitStack) -> None:
-        self.folder, self._jobs, self._executor, self._log, self._stack = folder, jobs, executor, log, stack
-        self.outcomes: dict[str, Outcome] = {}  # by resolved text
-        self.failures: list[str] = []
-        self._texts: dict[str, str] = {}
-        self._runs: dict[str, RunFile] = {}
-
-    def make(self, members: Sequence[Member]) -> None:
-        """Run those that are not there. Raises Interrupted."""
-        new: dict[str, Member] = {}
-        for member in members:
-            try:
-                text = self._texts[member.name] = member.resolved().text
-            except CaseError as error:
-                self.failures.append(f"{member.name}: {error.faults[0]}")
-                continue
-            if text not in self.outcomes and text not in new:
-                new[text] = member
-        found = run_members(list(new.values()), self.folder, jobs=self._jobs, executor=self._executor, log=self._log)
-        for text, outcome in zip(new, found, strict=True):
-            self.outcomes[text] = outcome
-            if not outcome.done:
-                self.failures.append(f"{outcome.member.name}: {outcome.message}")
-
-    def run(self, member: Member) -> RunFile | None:
-        """The run of a member; None where it has no result."""
-        outcome = self.outcomes.get(self._texts.get(member.name, ""))
-        if outcome is None or not outcome.done:
-            return None
-        name = outcome.member.name
-        if name not in self._runs:
-            self._runs[name] = self._stack.enter_context(RunFile(outcome.path))
-        return self._runs[name]
-
-    def why(self, member: Member) -> str:
-        """Why a member has no result."""
-        outcome = self.outcomes.get(self._texts.get(member.name, ""))
-        return next((line for line in self.failures if line.startswith(f"{member.name}: ")), "") or (
-            "not run" if outcome is None else outcome.message
-        )
-
-    @property
-    def cost(self) -> float:
-        """Processor seconds of all runs."""
-        done = [outcome for outcome in self.outcomes.values() if outcome.done]
-        return sum(spent(self.run(outcome.member)) for outcome in done)
-
-
-def spent(run: RunFile | None) -> float:
-    """Processor seconds of a run's steps."""
-    return 0.0 if run is None else float(run.pace[1])
 
 
 def uncertainty(
@@ -118,7 +59,7 @@ def uncertainty(
     base_case = member.resolved()
     wanted = _wanted(base_case, observe)
     with ExitStack() as stack:
-        study = _Study(folder / RUNS, jobs, executor, log, stack)
+        study = Runs(folder / RUNS, jobs, executor, log, stack)
         study.make([member])
         run = study.run(member)
         if run is None:
@@ -150,17 +91,14 @@ def _wanted(case: Case, observe: Sequence[str]) -> tuple[str, ...]:
     return tuple(observe) or tuple(case.observe)
 
 
-Found = dict[str, Source]  # of one source, by number
-
-
-def _sources(study: _Study, base: Base, recorded: Recorded, fine: bool, meant: bool) -> list[Found]:
+def _sources(study: Runs, base: Base, recorded: Recorded, fine: bool, meant: bool) -> list[Found]:
     """All sources of error, each by number."""
     value = recorded.numbers()
     if base.case.thermal is not None and base.case.thermal.energy > 0:
         words = "hidden by chance: two random runs differ by more than their steps and nodes make"
         found = [_seeds(study, base, recorded, fine), {k: _source("step, nodes", None, words) for k in value}]
     else:
-        found = _refined(study, base, recorded, fine)
+        found = refined(study, base, recorded, fine)
     found.append(sampling.cadence(recorded))
     if base.case.fluid.on_grid and base.case.fluid.single:
         found.append(
@@ -169,48 +107,11 @@ def _sources(study: _Study, base: Base, recorded: Recorded, fine: bool, meant: b
     return [*found, *(_choices(study, base, recorded) if meant else [])]
 
 
-def _refined(study: _Study, base: Base, recorded: Recorded, fine: bool) -> list[Found]:
-    """The errors of step and nodes, and on a grid of the place in a cell."""
-    ladder = Ladder(base, recorded, study.make, study.run, study.why)
-    in_time = levels.steps(base)
-    under = levels.twice_the_step(base) if ladder.climb(in_time, fine) else ()
-    in_space = levels.nodes(base, under)
-    moved = _half_cell(base, under) if base.case.fluid.on_grid else None
-    ladder.climb(in_space, fine, [] if moved is None or isinstance(moved, str) else [moved[0]])
-    found = [ladder.sources(in_time), ladder.sources(in_space)]
-    if moved is not None:
-        found.append(_place(study, levels.level_member(base, in_space, 0), moved, recorded))
-    return found
-
-
-def _half_cell(base: Base, under: tuple[str, ...]) -> tuple[Member, np.ndarray] | str:
-    """The run half a cell aside, and the shift; or why there is none."""
-    try:
-        return levels.half_cell(base, under)
-    except CaseError as error:
-        return error.faults[0]
-
-
 def _source(name: str, estimate: Estimate | None, words: str, numerical: bool = True) -> Source:
     return Source(name, numerical, estimate, words)
 
 
-def _place(study: _Study, here: Member, moved: tuple[Member, np.ndarray] | str, recorded: Recorded) -> Found:
-    """Half the difference to a run half a cell aside: places on and between grid points are the two extremes."""
-    name, value = "place in a cell", recorded.numbers()
-    if isinstance(moved, str):
-        return {k: _source(name, None, moved) for k in value}
-    own_run, run = study.run(here), study.run(moved[0])
-    if own_run is None or run is None:
-        return {k: _source(name, None, study.why(moved[0] if own_run is not None else here)) for k in value}
-    there, out = moved_back(run, moved[1]), {}
-    for key, number in recorded.of(own_run).numbers().items():
-        error = 0.5 * (number - there[key])
-        out[key] = _source(name, Estimate(error, abs(error), None, "", (number, there[key])), "a run half a cell away")
-    return out
-
-
-def _seeds(study: _Study, base: Base, recorded: Recorded, fine: bool) -> Found:
+def _seeds(study: Runs, base: Base, recorded: Recorded, fine: bool) -> Found:
     """The scatter between random runs: of blocks of the base, or with ``fine`` of runs with other seeds."""
     if not fine:
         return sampling.blocks(recorded)
@@ -220,7 +121,7 @@ def _seeds(study: _Study, base: Base, recorded: Recorded, fine: bool) -> Found:
     return sampling.between([recorded.numbers(), *(recorded.of(run).numbers() for run in runs)])
 
 
-def _choices(study: _Study, base: Base, recorded: Recorded) -> list[Found]:
+def _choices(study: Runs, base: Base, recorded: Recorded) -> list[Found]:
     """The choices that make another scene: images, slip, stretching."""
     value = recorded.numbers()
     asked: list[tuple[str, Member, float, float, str]] = []
@@ -241,7 +142,7 @@ def _choices(study: _Study, base: Base, recorded: Recorded) -> list[Found]:
     return [*(_choice(study, one, recorded) for one in asked), *unknown]
 
 
-def _choice(study: _Study, asked: tuple[str, Member, float, float, str], recorded: Recorded) -> Found:
+def _choice(study: Runs, asked: tuple[str, Member, float, float, str], recorded: Recorded) -> Found:
     """The effect of a choice, by the law of its limit: error (f - f') times a factor, a share of it in doubt."""
     name, member, factor, share, law = asked
     run, value = study.run(member), recorded.numbers()

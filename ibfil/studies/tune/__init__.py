@@ -1,0 +1,1 @@
+"""`ibfil tune`: the cheapest step and nodes for an error that is allowed."""
