@@ -10,7 +10,8 @@ from ..assembly.profiles import alone
 from ..simulation.failures import LARGEST_TWIST
 
 if TYPE_CHECKING:
-    from ..case.filament import End, Filament
+    from ..case.bodies.end import End
+    from ..case.filament import Filament
     from ..simulation.simulation import Simulation
 
 LARGE = 2 * np.pi / 8  # radians from node to node: 8 nodes a turn, as of any wave (warnings.NODES_A_WAVE)

@@ -56,12 +56,15 @@ def _starts(simulation: Simulation, overrides: tuple[str, ...]) -> dict[str, np.
 
 
 def _tied(case: Case, shift: np.ndarray) -> Iterator[str]:
-    """The overrides of flows, loads and springs that are tied to places."""
+    """The overrides of flows, bodies, loads and springs that are tied to places."""
     if case.fluid.flow is not None:
         yield f"fluid.flow={_elsewhere(case.fluid.flow, shift)}"
     for name, link in case.links.items():
         if isinstance(link, Spring) and any(site.point is not None for site in link.between):
             yield f"link.{name}.between=[{', '.join(_site(site, shift) for site in link.between)}]"
+    for name, body in case.bodies.items():
+        if body.position is not None:
+            yield f"body.{name}.position={[float(x) for x in np.array(body.position) + shift]}"
     for name, filament in case.filaments.items():
         for side, end in (("start", filament.start), ("finish", filament.finish)):
             if end.spring is not None:
