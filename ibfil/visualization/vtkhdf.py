@@ -1,8 +1,8 @@
-"""A run as VTKHDF: `ibfil vtk --hdf`, one file for all times of the filaments, one of the links, one of the fields.
+"""A run as VTKHDF: `ibfil vtk --hdf`, a file for all times of the filaments, of links, of bodies, of the fields.
 
     /VTKHDF                 Type, Version; of an image WholeExtent, Origin, Spacing, Direction
     /VTKHDF/Steps           NSteps, Values (the times), and where each time begins in the arrays
-    /VTKHDF/Points, Lines   places; polylines, which are kept once for as long as they stay the same
+    /VTKHDF/Points, Lines   places; cells, which are kept once for as long as they stay the same
     /VTKHDF/PointData/...   (points of all times one after the other, ...) of lines; (time, z, y, x, ...) of images
 
 ParaView 5.12 and later open it. The layout is of Kitware's file format VTKHDF 2.0; arrays are those of the .vtp and
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..analysis.body_meshes import body_surfaces
 from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of
 from ..errors import CaseError
 from ..io.overwriting import Kind, refuse, replacing
@@ -36,7 +37,7 @@ def write_vtkhdf(
 ) -> list[Path]:
     """Write the run file ``run`` into ``folder``, by default the run's name, as VTKHDF; returns the paths.
 
-    RUN_filaments.vtkhdf, and RUN_links.vtkhdf and RUN_grid.vtkhdf where there are any; ``wrap`` and ``images`` as of
+    RUN_filaments.vtkhdf, and RUN_links, RUN_bodies and RUN_grid.vtkhdf where there are any; ``wrap`` and ``images`` as of
     `ibfil.write_vtk`; every ``every``-th output, and all fields. A file is whole or not there. Raises CaseError for
     wrapping or images without a box, RunFileError where another kind of file stands in the place, and as `ibfil.open`.
     """
@@ -53,10 +54,13 @@ def write_vtkhdf(
             return (snapshot for i, snapshot in enumerate(opened.snapshots()) if i % every == 0)
 
         paths = [_place(folder, run, "filaments")]
-        _write(paths[0], lambda file: _write_lines(file, ((s.time, polylines(s, rods, box, view)) for s in shown())))
+        _write(paths[0], lambda file: _write_meshes(file, ((s.time, polylines(s, rods, box, view)) for s in shown())))
         if opened.links:
             paths.append(_place(folder, run, "links"))
-            _write(paths[-1], lambda file: _write_lines(file, ((s.time, link_lines(s)) for s in shown())))
+            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, link_lines(s)) for s in shown())))
+        if opened.bodies:
+            paths.append(_place(folder, run, "bodies"))
+            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, body_surfaces(opened, s)) for s in shown())))
         if opened.grid is not None and len(opened.grid.time):
             paths.append(_place(folder, run, "grid"))
             _write(paths[-1], lambda file: _write_fields(file, opened))
@@ -93,8 +97,17 @@ def _append(group: h5py.Group, name: str, rows: np.ndarray) -> None:
     dataset[len(dataset) - len(rows) :] = rows
 
 
-def _write_lines(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) -> None:
-    """A temporal PolyData of polylines: points of all times, and lines where they differ from those before."""
+def _cells(mesh: vtkDataSet, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Where each cell of a kind begins, and the points of all of them."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    get = {"Vertices": "GetVerts", "Lines": "GetLines", "Polygons": "GetPolys", "Strips": "GetStrips"}[kind]
+    cells = getattr(mesh, get)()
+    return vtk_to_numpy(cells.GetOffsetsArray()), vtk_to_numpy(cells.GetConnectivityArray())
+
+
+def _write_meshes(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) -> None:
+    """A temporal PolyData: points of all times, and cells where they differ from those before."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     root = _root(file, "PolyData")
@@ -102,18 +115,20 @@ def _write_lines(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) ->
     begins = steps.create_group("PointDataOffsets")
     for kind in _KINDS:
         root.create_group(kind)
-    last, part, cells, ids, points = np.zeros(0, np.int64), -1, 0, 0, 0
-    new_cells = new_ids = 0
+    last: list[np.ndarray] = []
+    part, points, cells, ids = -1, 0, np.zeros(4, np.int64), np.zeros(4, np.int64)
+    new_cells, new_ids = np.zeros(4, np.int64), np.zeros(4, np.int64)
     for count, (time, mesh) in enumerate(meshes, 1):
-        lines = mesh.GetLines()
-        offsets, each = (vtk_to_numpy(a) for a in (lines.GetOffsetsArray(), lines.GetConnectivityArray()))
-        if not np.array_equal(offsets, last):  # polylines one after the other: where each begins says all
-            part, cells, ids, last = part + 1, cells + new_cells, ids + new_ids, offsets
-            new_cells, new_ids = len(offsets) - 1, len(each)
-            _append_topology(root, offsets, each)
-        arrays = mesh.GetPointData()
-        for i in range(arrays.GetNumberOfArrays()):
-            array = arrays.GetArray(i)
+        topology = [_cells(mesh, kind) for kind in _KINDS]
+        arrays = [array for pair in topology for array in pair]
+        if not last or not all(np.array_equal(one, other) for one, other in zip(arrays, last, strict=True)):
+            part, cells, ids, last = part + 1, cells + new_cells, ids + new_ids, [array.copy() for array in arrays]
+            new_cells = np.array([len(offsets) - 1 for offsets, _ in topology])
+            new_ids = np.array([len(each) for _, each in topology])
+            _append_topology(root, mesh.GetNumberOfPoints(), topology)
+        values = mesh.GetPointData()
+        for i in range(values.GetNumberOfArrays()):
+            array = values.GetArray(i)
             _append(data, array.GetName(), vtk_to_numpy(array))
             _append(begins, array.GetName(), np.array([points]))
         _append(root, "Points", vtk_to_numpy(mesh.GetPoints().GetData()))
@@ -122,25 +137,24 @@ def _write_lines(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) ->
         points += mesh.GetNumberOfPoints()
 
 
-def _append_topology(root: h5py.Group, offsets: np.ndarray, each: np.ndarray) -> None:
-    """A part: its lines, and none of the other kinds of cells."""
-    _append(root, "NumberOfPoints", np.array([len(each)]))
-    for kind in _KINDS:
-        own = kind == "Lines"
-        _append(root[kind], "Offsets", offsets if own else offsets[:1])
-        _append(root[kind], "NumberOfCells", np.array([len(offsets) - 1 if own else 0]))
-        _append(root[kind], "NumberOfConnectivityIds", np.array([len(each) if own else 0]))
-        _append(root[kind], "Connectivity", each if own else each[:0])
+def _append_topology(root: h5py.Group, points: int, topology: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    """A part: its cells of each kind."""
+    _append(root, "NumberOfPoints", np.array([points]))
+    for kind, (offsets, each) in zip(_KINDS, topology, strict=True):
+        _append(root[kind], "Offsets", offsets)
+        _append(root[kind], "NumberOfCells", np.array([len(offsets) - 1]))
+        _append(root[kind], "NumberOfConnectivityIds", np.array([len(each)]))
+        _append(root[kind], "Connectivity", each)
 
 
-def _append_step(steps: h5py.Group, time: float, part: int, points: int, cells: int, ids: int) -> None:
-    """A time: the part that it shows, and where its points and lines begin."""
+def _append_step(steps: h5py.Group, time: float, part: int, points: int, cells: np.ndarray, ids: np.ndarray) -> None:
+    """A time: the part that it shows, and where its points begin, and its cells of each kind (4,)."""
     _append(steps, "Values", np.array([time]))
     _append(steps, "NumberOfParts", np.array([1]))
     _append(steps, "PartOffsets", np.array([part]))
     _append(steps, "PointOffsets", np.array([points]))
     for name, begin in (("CellOffsets", cells), ("ConnectivityIdOffsets", ids)):
-        _append(steps, name, np.array([[begin if kind == "Lines" else 0 for kind in _KINDS]]))
+        _append(steps, name, begin[None])
 
 
 def _write_fields(file: h5py.File, run: RunFile) -> None:

@@ -10,6 +10,7 @@ from ibfil.analysis.body_meshes import BEYOND, body_surfaces, extents
 from ibfil.io.reader import RunFile
 from ibfil.visualization.bodies import outline
 from ibfil.visualization.vtk_files import write_vtk
+from ibfil.visualization.vtkhdf import write_vtkhdf
 
 SIZE = np.array([0.2, 0.15, 0.1])
 
@@ -42,6 +43,27 @@ def test_a_surface_is_that_of_the_body_and_its_axes_go_beyond_it(path):
     np.testing.assert_allclose(found["velocity"][of], rigid[of], atol=1e-5)
     assert np.linalg.norm(body.spin) > 0.01
     np.testing.assert_allclose(ends[0][-1, 0], body.position + 0.2 * body.e1, atol=1e-12)
+
+
+def test_vtkhdf_has_the_surfaces_and_axes_of_every_time(path, tmp_path):
+    import pyvista
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    (file,) = (made for made in write_vtkhdf(path, tmp_path) if made.stem == "run_bodies")
+    reader = vtkHDFReader()
+    reader.SetFileName(str(file))
+    with RunFile(path) as run:
+        for number in range(len(run.time)):
+            reader.UpdateInformation()
+            reader.SetStep(number)
+            reader.UpdateTimeStep(run.time[number])
+            found = pyvista.wrap(reader.GetOutputDataObject(0))
+            known = pyvista.wrap(body_surfaces(run, run.snapshot(number)))
+            np.testing.assert_array_equal(found.points, known.points)
+            np.testing.assert_array_equal(found.faces, known.faces)
+            np.testing.assert_array_equal(found.lines, known.lines)
+            for name in ("velocity", "body", "axis"):
+                np.testing.assert_array_equal(found[name], known[name])
 
 
 def test_an_outline_is_the_shadow_of_the_surface(path):

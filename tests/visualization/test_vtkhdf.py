@@ -79,7 +79,7 @@ def test_lines_may_change_from_time_to_time(tmp_path):
         arrays = [{"a": np.float32(random.normal(size=n)), "b": random.normal(size=(n, 3))} for n in lengths]
         made.append((0.5 * time, meshes._poly_data(points, lengths, arrays, 0.5 * time)))
     with h5py.File(tmp_path / "a.vtkhdf", "w") as file:
-        vtkhdf._write_lines(file, iter(made))
+        vtkhdf._write_meshes(file, iter(made))
     read = Read(tmp_path / "a.vtkhdf")
     assert read.times == [0.0, 0.5, 1.0, 1.5, 2.0]
     for number in (0, 3, 1, 4, 2):
