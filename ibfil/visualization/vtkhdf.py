@@ -37,7 +37,7 @@ def write_vtkhdf(
 ) -> list[Path]:
     """Write the run file ``run`` into ``folder``, by default the run's name, as VTKHDF; returns the paths.
 
-    RUN_filaments.vtkhdf, and RUN_links, RUN_bodies and RUN_grid.vtkhdf where there are any; ``wrap`` and ``images`` as of
+    RUN_filaments.vtkhdf, and of links, bodies and the grid where there are any; ``wrap`` and ``images`` as of
     `ibfil.write_vtk`; every ``every``-th output, and all fields. A file is whole or not there. Raises CaseError for
     wrapping or images without a box, RunFileError where another kind of file stands in the place, and as `ibfil.open`.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.body_meshes import extents
 from ...analysis.meshes import box_of, polylines, rods_of
 from ...analysis.run import Run, open_run
 from ...assembly.fluids.models import fluid_model
@@ -28,6 +29,7 @@ MOST = 20.0  # MB of a page, at most
 SHEET = 96  # points along a side of the flow's plane, at most
 FIELDS = 60  # fields shown, at most
 LEVELS = 256  # of colours
+RING = 24  # strokes of a ring about a body
 
 
 def write_page(
@@ -72,7 +74,7 @@ def _picked(run: Run, quantities: int, flow: dict[str, Any] | None, most: float,
     """The outputs that are in the page: all, or as many as its bound allows, evenly."""
     nodes = sum(columns["position"].shape[1] for columns in run.filaments.values())
     room = 1e6 * most - 40e3 - len(run.case_text.encode()) - len(json.dumps(flow))
-    elements = sum(columns["first"].shape[1] for columns in run.links.values())
+    elements = _strokes(run, np.zeros(1, np.int64)).shape[1]
     each = 4 / 3 * (nodes * (6 + quantities) + 12 * elements) + 25
     count = int(min(len(run), room // each))
     if count < 1:
@@ -97,7 +99,7 @@ def _filled(title: str, content: dict[str, Any]) -> str:
 def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str, Any] | None) -> dict[str, Any]:
     """All that the page knows of the run, as JSON: arrays as base64, little-endian."""
     every = [np.asarray(columns["position"])[picked] for columns in run.filaments.values()]
-    places, links = np.concatenate(every, axis=1), _links(run, picked)
+    places, links = np.concatenate(every, axis=1), _strokes(run, picked)
     both = np.concatenate([places, links.reshape(len(picked), -1, 3)], axis=1)
     low, high = both.min(axis=(0, 1)), both.max(axis=(0, 1))
     span = np.where(high > low, high - low, 1.0)
@@ -128,10 +130,22 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
     }
 
 
-def _links(run: Run, picked: np.ndarray) -> np.ndarray:
-    """The two ends of each element of all links (T, K, 2, 3)."""
+def _strokes(run: Run, picked: np.ndarray) -> np.ndarray:
+    """The two ends of each line (T, K, 2, 3): of the elements of all links, and three rings about each body."""
     each = [np.stack([np.asarray(c["first"])[picked], np.asarray(c["second"])[picked]], 2) for c in run.links.values()]
+    turn = np.linspace(0.0, 2 * np.pi, RING + 1)[:, None]
+    for ends, columns in zip(extents(run), _sized(run), strict=True):
+        centre = np.asarray(columns["position"])[picked, None]
+        arms = [ends[picked, None, k] - centre for k in (0, 2, 4)]
+        for one, other in ((0, 1), (1, 2), (2, 0)):
+            ring = centre + np.cos(turn) * arms[one] + np.sin(turn) * arms[other]
+            each.append(np.stack([ring[:, :-1], ring[:, 1:]], axis=2))
     return np.concatenate([np.zeros((len(picked), 0, 2, 3)), *each], axis=1)
+
+
+def _sized(run: Run) -> list[Mapping[str, Any]]:
+    """The columns of bodies that have a size."""
+    return [columns for name, columns in run.bodies.items() if any(run.case.bodies[name].shape.semi_axes)]
 
 
 def _packed(values: np.ndarray, kind: str) -> str:
