@@ -7,10 +7,12 @@ import pytest
 from helpers.runs import BODIES, FLUIDS, real, rod, run
 
 from ibfil.analysis.body_meshes import BEYOND, body_surfaces, extents
+from ibfil.analysis.run import open_run
 from ibfil.io.reader import RunFile
 from ibfil.visualization.bodies import outline
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
+from ibfil.visualization.web.page import RING, _strokes
 
 SIZE = np.array([0.2, 0.15, 0.1])
 
@@ -64,6 +66,16 @@ def test_vtkhdf_has_the_surfaces_and_axes_of_every_time(path, tmp_path):
             np.testing.assert_array_equal(found.lines, known.lines)
             for name in ("velocity", "body", "axis"):
                 np.testing.assert_array_equal(found[name], known[name])
+
+
+def test_a_page_has_rings_on_the_body(path):
+    with open_run(path) as run:
+        rings = _strokes(run, np.array([len(run) - 1]))[0]
+        body = run.snapshot(-1).bodies["head"]
+    of = np.array([np.abs((end - body.position) @ np.stack([body.e1, body.e2, body.e3]).T / SIZE) for end in rings])
+    on = np.abs(np.linalg.norm(of, axis=2) - 1).max(axis=1) < 1e-9
+    assert np.count_nonzero(on) == 3 * RING
+    assert np.count_nonzero(of[on].min(axis=2) < 1e-9) == 2 * 3 * RING  # each in a plane of two axes
 
 
 def test_an_outline_is_the_shadow_of_the_surface(path):

@@ -85,6 +85,13 @@ PHYSICS: dict[str, Physics] = {
             },
         },
     ),
+    "body": Physics(
+        "a sphere that the rod begins in",
+        {
+            "body": {"head": {"shape": {"kind": "sphere", "radius": 0.2}}},
+            "filament.rod.start": {"end": "body", "body": "head"},
+        },
+    ),
     "thermal": Physics("thermal forces", {**_STILL, "thermal": {"energy": 0.01, "seed": 1}, "output.every": 0.01}),
     "fields": Physics("the flow on a grid, written", {"output.grid_every": 0.25}),
     "stop": Physics("a rule that ends the run", {"stop": [{"observe": "speed", "above": 100.0}]}),
