@@ -67,7 +67,7 @@ def entry(shipped: library.Shipped) -> str:
         f"![{shipped.name}](../postprocess/pictures/cases/{shipped.name}.png)",
         "",
         f"{shipped.title}.",
-        f"After {shipped.source}.",
+        f"{shipped.source}." if shipped.source.startswith("After ") else f"After {shipped.source}.",
         f"`{first}`: expected {check.expected}, found {float(check.found):.6g}{verdict}, in {took}.",
         "",
     ]

@@ -13,10 +13,10 @@ import matplotlib.pyplot as plt
 
 
 def main(table: str, picture: str) -> None:
-    """Draw the sweep of parameters.phase."""
+    """Draw the sweep of parameters.lag."""
     with open(table, encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    phase = np.array([float(row["parameters.phase"]) for row in rows]) / np.pi
+    phase = np.array([float(row["parameters.lag"]) for row in rows]) / np.pi
     flux = np.array([float(row["flux"]) for row in rows])
     order = np.argsort(phase)
     fig, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")

@@ -35,7 +35,7 @@ study whirling_trade trade whirling time.end=10 'observe.growth.over=[5,10]' 'ob
 
 # Four cilia in a row on a wall: what they pump over the phase between neighbours.
 study cilia_phase sweep cilia_row \
-    --vary parameters.phase=-3.1416,-2.3562,-1.9635,-1.5708,-1.1781,-0.7854,-0.3927,0,0.3927,0.7854,1.1781,1.5708,2.3562,3.1416
+    --vary parameters.lag=-3.1416,-2.3562,-1.9635,-1.5708,-1.1781,-0.7854,-0.3927,0,0.3927,0.7854,1.1781,1.5708,2.3562,3.1416
 python "$here/flux_over_phase.py" "$out/cilia_phase/sweep.csv" "$out/cilia_phase/sweep.png"
 
 # The paper's own grid locks without slip: nodes h/2 apart. Slip, or cells no larger than the nodes are apart, cure it.
