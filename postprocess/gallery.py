@@ -14,17 +14,20 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 import ibfil
 from ibfil.analysis.summary import duration
 from ibfil.case import library
 from ibfil.case.reading import quick_case
+from ibfil.visualization.bodies import add_outlines
 from ibfil.visualization.style import plane_of_motion
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURES = ROOT / "cases" / "README.md", ROOT / "postprocess" / "pictures" / "cases"
 SHAPES = 12
+DARK = (0.0, 0.27, 0.53)
 HEAD = """# The shipped cases
 
 `ibfil run NAME` runs one, `ibfil new NAME mine.toml` copies it. Pictures show its shapes from light to dark as
@@ -42,7 +45,9 @@ def picture(run: ibfil.Run, path: Path) -> None:
     some = np.unique(np.linspace(0, len(run) - 1, SHAPES).astype(int))
     for shade, output in zip(np.linspace(0.25, 1.0, len(some)), some, strict=True):
         for r in positions:
-            axes.plot(r[output, :, across], r[output, :, up], color=(0.0, 0.27, 0.53), alpha=shade, lw=1.2)
+            axes.plot(r[output, :, across], r[output, :, up], color=DARK, alpha=shade, lw=1.2)
+    fading = ListedColormap(1 - np.linspace(0.25, 1.0, 64)[:, None] * (1 - np.array(DARK)))
+    add_outlines(axes, run, (across, up), some, fading, (0.0, float(run.time[-1])))
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("xyz"[across], fontsize=8)
     axes.set_ylabel("xyz"[up], fontsize=8)
