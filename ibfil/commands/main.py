@@ -77,6 +77,16 @@ def parse(argv: list[str]) -> argparse.Namespace:
     return arguments
 
 
+class _Help(argparse.HelpFormatter):
+    """Help that takes names like CASE [KEY=VALUE ...] as they are: argparse would write them twice."""
+
+    def _format_args(self, action: argparse.Action, default_metavar: str) -> str:
+        name = str(action.metavar)
+        if not name.endswith("...]"):
+            return super()._format_args(action, default_metavar)
+        return name if action.nargs == "+" else f"[{name}]"
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="ibfil",
@@ -87,7 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"ibfil {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for module in COMMANDS:
-        command = commands.add_parser(module.NAME, help=module.HELP, description=module.HELP, epilog=None)
+        command = commands.add_parser(
+            module.NAME, help=module.HELP, description=module.HELP, epilog=None, formatter_class=_Help
+        )
         command.set_defaults(do=module.do)
         module.add(command)
     return parser

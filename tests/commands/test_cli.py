@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -17,10 +15,8 @@ import pytest
 from helpers.made_run import BENT, make_run
 from helpers.runs import wait_for
 
-from ibfil.case import library
 from ibfil.commands import arguments, main, run
 from ibfil.io.reader import RunFile
-from ibfil.observables.base import KINDS
 
 ROOT = Path(__file__).parents[2]
 
@@ -134,123 +130,6 @@ def test_words_may_stand_before_and_after_options(here, capsys):
         assert run.time[-1] == 0.015
 
 
-def test_an_existing_run_is_replaced_only_with_force(here, capsys):
-    assert main.main(["run", "bent.toml"]) == 0
-    before = (here / "bent.h5").read_bytes()
-    assert main.main(["run", "bent.toml", "title=changed"]) == 2
-    assert (here / "bent.h5").read_bytes() == before
-    assert "--force" in capsys.readouterr().err
-    assert main.main(["run", "bent.toml", "title=changed", "--force"]) == 0
-    with RunFile("bent.h5") as run:
-        assert run.case.title == "changed"
-
-
-def test_no_command_writes_over_a_file_of_another_kind_or_one_that_it_reads(here, capsys):
-    """Not with --force either: a case, a run, a picture, notes."""
-    make_run(here / "made.h5")
-    (here / "notes.csv").write_text("date,medium\nMonday,3 mM ATP\n")
-    (here / "notes.png").write_text("no picture")
-    (here / "bent").mkdir()
-    before = {path: path.read_bytes() for path in here.iterdir() if path.is_file()}
-    for words in (
-        ["run", "bent.toml", "-o", "bent.toml"],
-        ["run", "bent.toml", "-o", "notes.csv"],
-        ["show", "made.h5", "--csv", "bent.toml"],
-        ["show", "made.h5", "--csv", "made.h5"],
-        ["show", "made.h5", "--csv", "notes.csv"],
-        ["show", "made.h5", "--plot", "notes.png"],
-        ["render", "made.h5", "-o", "notes.png"],
-    ):
-        for force in ([], ["--force"]):
-            assert main.main([*words, *force]) == 2
-            (line,) = capsys.readouterr().err.splitlines()
-            assert f"{words[-1]}: is " in line
-            assert "--force" not in line
-    (here / "sweep.csv").write_text("date,medium\n")
-    assert main.main(["sweep", "bent.toml", "--vary", "fluid.viscosity=1,2", "-o", "."]) == 2
-    assert "sweep.csv: is there, and no study wrote it" in capsys.readouterr().err
-    assert {path: path.read_bytes() for path in before} == before
-    assert {path.name for path in here.iterdir()} == {path.name for path in before} | {"bent", "sweep.csv"}
-
-
-def test_tables_and_pictures_are_replaced_only_with_force(here, capsys):
-    make_run(here / "made.h5")
-    for words in (["--csv", "a.csv"], ["--plot", "a.png"]):
-        assert main.main(["show", "made.h5", *words]) == 0
-        before = (here / words[1]).read_bytes()
-        assert main.main(["show", "made.h5", *words]) == 2
-        assert f"{words[1]}: exists already; --force writes over it" in capsys.readouterr().err
-        assert main.main(["show", "made.h5", *words, "--force"]) == 0
-        assert (words[0] == "--plot") or (here / words[1]).read_bytes() == before
-    (here / "link.csv").symlink_to("a.csv")
-    assert main.main(["show", "made.h5", "--csv", "link.csv", "--force"]) == 0
-    assert (here / "link.csv").is_symlink()
-    assert {path.name for path in here.iterdir()} == {"made.h5", "bent.toml", "a.csv", "a.png", "link.csv"}
-
-
-def test_a_scene_for_paraview_that_was_changed_is_kept(here):
-    make_run(here / "made.h5")
-    assert main.main(["vtk", "made.h5"]) == 0
-    scene = here / "made" / "made_paraview.py"
-    written = scene.read_text()
-    assert main.main(["vtk", "made.h5"]) == 0
-    assert scene.read_text() == written
-    scene.write_text(written.replace("ViewSize = [1280, 960]", "ViewSize = [640, 480]"))
-    assert main.main(["vtk", "made.h5"]) == 0
-    assert "[640, 480]" in scene.read_text()
-    scene.unlink()
-    (here / "made" / "made.pvd").write_text("mine")
-    assert main.main(["vtk", "made.h5"]) == 2
-    assert (here / "made" / "made.pvd").read_text() == "mine"
-
-
-def test_all_faults_are_told_at_once_and_nothing_is_written(here, capsys):
-    assert main.main(["run", "bent.toml", "fluid.viscosty=2", "filament.rod.nodes=3", "time.end=-1"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    lines = err.splitlines()
-    assert all(line.startswith("ibfil: bent.toml: ") for line in lines)
-    for key in ("viscosity", "filament.rod.nodes", "time.end"):
-        assert sum(key in line for line in lines) == 1
-    assert {path.name for path in here.iterdir()} == {"bent.toml"}
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["run", "bend.toml"], "bend.toml: no such file"),
-        (["run", "swimer_stokes"], "did you mean 'swimmer_stokes'?"),
-        (["run"], "found no case"),
-        (["run", "bent.toml", "nonsense"], "nonsense: found a word; allowed: KEY=VALUE"),
-        (["run", "bent.toml", "-o", "no/such/x.h5"], "no/such/x.h5: there is no folder no/such"),
-        (["run", "--resume", "gone.h5"], "gone.h5"),
-        (["run", "--resume", "bent.toml", "-o", "x.h5"], "-o"),
-        (["show", "bent.toml"], "is a case, not a run file; `ibfil run bent.toml` makes one of it"),
-        (["vtk", "gone.h5"], "gone.h5: there is no such file"),
-        (["new", "swimmer_stokes", "bent.toml"], "is there already"),
-        (["new", "swimmer", "x.toml"], "no shipped case"),
-        (["verify", "gone"], "gone: no such file"),
-    ],
-)
-def test_bad_input_is_one_line_and_no_traceback(here, capsys, words, said):
-    before = {path.name: path.read_bytes() for path in here.iterdir()}
-    status = main.main(words)
-    out, err = capsys.readouterr()
-    assert said in err
-    assert len(err.splitlines()) == 1
-    assert status == 2
-    assert "finished" not in out
-    assert {path.name: path.read_bytes() for path in here.iterdir()} == before
-
-
-@pytest.mark.parametrize("words", [["rum"], ["run", "bent.toml", "--frce"], ["show"], ["cases", "stray"], []])
-def test_words_the_parser_does_not_know(here, capsys, words):
-    with pytest.raises(SystemExit) as done:
-        main.main(words)
-    assert done.value.code == 2
-    assert "usage: ibfil" in capsys.readouterr().err
-
-
 def test_a_run_that_diverges(here, capsys):
     words = ["time.scheme=explicit", "time.step=0.005", "filament.rod.stretching=1e5"]
     assert main.main(["run", "bent.toml", *words]) == 1
@@ -361,75 +240,3 @@ def test_a_first_run_is_told_that_it_compiles(here, capsys, monkeypatch, ours, s
         (here / f"rods_{digest}" / "geometry._measured-9.py311.nbi").touch()
     arguments.say_if_cold()
     assert ("compiling" in capsys.readouterr().err) == said
-
-
-# --- the other commands
-
-
-def test_cases_lists_every_shipped_case_with_its_title(capsys):
-    assert main.main(["cases"]) == 0
-    out = capsys.readouterr().out
-    rows = library.listing()
-    assert len(rows) > 0
-    for row in rows:
-        assert row.name in out
-        assert row.title in out
-        assert row.source in out
-
-
-def test_shipped_names_are_unique_and_say_their_source():
-    files = list(library.folder().rglob("*.toml"))
-    assert len(library.paths()) == len(files)
-    assert all(row.title and row.source for row in library.listing())
-
-
-def test_new_copies_a_shipped_case(here, capsys):
-    assert main.main(["new", "swimmer_stokes", "mine.toml"]) == 0
-    assert (here / "mine.toml").read_bytes() == library.paths()["swimmer_stokes"].read_bytes()
-
-
-def test_a_folder_is_no_case(here, capsys):
-    (here / "d.toml").mkdir()
-    assert main.main(["check", "d.toml"]) == 2
-    assert "d.toml: is a folder; allowed: a case file" in capsys.readouterr().err
-
-
-def test_a_file_wins_over_a_shipped_name(here):
-    assert library.find("swimmer_stokes") == library.paths()["swimmer_stokes"]
-    (here / "swimmer_stokes").write_text(BENT)
-    assert library.find("swimmer_stokes") == Path("swimmer_stokes")
-
-
-def test_schema_is_text_or_json_schema(capsys):
-    assert main.main(["schema"]) == 0
-    text = capsys.readouterr().out
-    assert main.main(["schema", "--json"]) == 0
-    schema = json.loads(capsys.readouterr().out)
-    for key in ("title", "filament", "fluid", "compute"):
-        assert key in schema["properties"]
-    for name in schema["properties"]:
-        assert name in text
-    assert set(KINDS) >= {"drift", "position"}
-    for kind in KINDS:  # says of each what it is and which keys it has
-        assert re.search(rf"\n  {kind}: [A-Z|][^\0]*?\((\w+,\s+)*\w+\)", text), kind
-
-
-def test_check_runs_nothing_and_tells(here, capsys):
-    assert main.main(["check", "bent.toml", "fluid.viscosity=3"]) == 0
-    assert capsys.readouterr().out.strip()
-    assert {path.name for path in here.iterdir()} == {"bent.toml"}
-
-
-def test_show_writes_what_it_is_asked_for(here, capsys):
-    make_run(here / "made.h5")
-    assert main.main(["show", "made.h5", "--json", "--csv", "made.csv", "--plot", "made.pdf"]) == 0
-    assert json.loads(capsys.readouterr().out)["title"] == "Two made filaments"
-    assert (here / "made.csv").read_text().startswith("time (s),")
-    assert (here / "made.pdf").read_bytes().startswith(b"%PDF")
-
-
-def test_vtk_says_what_to_open(here, capsys):
-    make_run(here / "made.h5")
-    assert main.main(["vtk", "made.h5"]) == 0
-    assert "made/made.pvd" in capsys.readouterr().out
-    assert (here / "made" / "made.pvd").exists()
