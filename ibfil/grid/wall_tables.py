@@ -47,10 +47,16 @@ def images(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.stack(np.broadcast_arrays(*parts))
 
 
-def octant(rim: int) -> np.ndarray:
-    """The octant (x, y, z, part) of distances below REACH, with a rim on both sides, and sums of heights below HIGH."""
+def octant(rim: int, scale: float = 1.0, number: type = np.float64) -> np.ndarray:
+    """The octant (x, y, z, part) of distances below REACH, with a rim on both sides, and sums of heights below HIGH.
+
+    Times ``scale``. Plane by plane, as getting fresh memory for the whole takes longer than all that is done with it.
+    """
     j, z = np.arange(-rim, REACH + rim, dtype=float), np.arange(HIGH + 2 * RIM, dtype=float)
-    return np.moveaxis(images(j[:, None, None], j[:, None], z), 0, 3)
+    out = np.empty((len(j), len(j), len(z), len(ODD)), number)
+    for plane, x in zip(out, j, strict=True):
+        plane[:] = scale * np.moveaxis(images(x, j[:, None], z), 0, 2)
+    return out
 
 
 @njit(cache=True, inline="always")

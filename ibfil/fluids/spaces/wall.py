@@ -40,10 +40,9 @@ class NoSlipWall(FreeSpace):
         if alpha or coupling.grid_vectors > 1:
             raise ValueError("the image of a force is that of Stokes flow, and torques have none here")
         scale = 1.0 / (viscosity * self.spacing)
-        images = scale * wall_tables.octant(points - 1)
+        images = wall_tables.octant(points - 1, scale, number)
         free = octant(1, points, self.spacing, viscosity, number)
-        flat: np.ndarray = np.ascontiguousarray(images.reshape(*images.shape[:2], -1), number)
-        return WallMobility(wall_pairs.Walled(free, flat, scale))
+        return WallMobility(wall_pairs.Walled(free, images.reshape(*images.shape[:2], -1), scale))
 
 
 @dataclass(frozen=True)
