@@ -53,8 +53,8 @@ def octant(rim: int, scale: float = 1.0, number: type = np.float64) -> np.ndarra
     Times ``scale``. Plane by plane, as getting fresh memory for the whole takes longer than all that is done with it.
     """
     j, z = np.arange(-rim, REACH + rim, dtype=float), np.arange(HIGH + 2 * RIM, dtype=float)
-    out = np.empty((len(j), len(j), len(z), len(ODD)), number)
-    for plane, x in zip(out, j, strict=True):
+    out: np.ndarray = np.empty((len(j), len(j), len(z), len(ODD)), number)
+    for plane, x in zip(out, j[:, None, None], strict=True):
         plane[:] = scale * np.moveaxis(images(x, j[:, None], z), 0, 2)
     return out
 
