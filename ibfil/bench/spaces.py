@@ -53,7 +53,7 @@ def wall_pairs(kernel: str, bar: float, count: int = 41) -> Row:
 
 
 def tables() -> list[Row]:
-    """Seconds to make the tables, which are not kept between runs, against 0.3 s."""
+    """Seconds to the tables, against 0.3 s: that of free space may be in the cache, that of a wall is always made."""
     rows = []
     for name, space in (("free space", FreeSpace(1.0)), ("a wall", NoSlipWall(1.0))):
         began = time.perf_counter()
