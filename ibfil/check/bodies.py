@@ -55,8 +55,11 @@ def of_body(name: str, body: Body) -> str:
         terms.append("held" if still else "moved as given")
     axes = "its own axes" if body.own_axes else "the lab"
     pushed = [f"external {key} in {axes}" for key in ("force", "torque") if getattr(body, key) is not None]
-    total = "the force and torque of body and rods on the fluid sum to what pushes them from outside, to round-off"
-    return f"body {name}: " + ", ".join([*terms, *(pushed or ["nothing pushes it from outside"])]) + f"; {total}"
+    if given is None and not pushed:
+        pushed = ["nothing pushes it from outside"]
+    outside = "pushes them from outside" if given is None else "pushes them from outside and what holds or moves it"
+    total = f"the force and torque of body and rods on the fluid sum to what {outside}, to round-off"
+    return f"body {name}: " + ", ".join([*terms, *pushed]) + f"; {total}"
 
 
 def _shape(body: Body) -> str:

@@ -11,6 +11,7 @@ that while only the k-th unknown q_k of the bodies moves by one, all by one fact
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -126,7 +127,7 @@ class _Bordered(_Response):
         rows = Rows.of(stiffness, np.unique(at // m))
         right = _system(stiffness.band, self.drag, self.e3, moved[:n], force[:n], inverse)
         _hold(stiffness.band, right, at, value)
-        solve = self._solver(stiffness, at, m)
+        solve = self._solver(stiffness, at)
         others = -carried.columns.transpose(2, 0, 1)
         flat = others.reshape(len(others), n * m)
         flat[:, at] = 0.0
@@ -145,13 +146,9 @@ class _Bordered(_Response):
         reaction[n:] = own[1]
         return Solution(d, np.concatenate([felt, own[0]]), reaction)
 
-    def _solver(self, stiffness: Stiffness, at: np.ndarray, m: int):
+    def _solver(self, stiffness: Stiffness, at: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The factored matrix of the rods, the rows of held unknowns in it."""
-        band, pairs = stiffness
-        free = np.ones((self._n, m))
-        free.ravel()[at] = 0.0
-        blocks = pairs.blocks * free[pairs.rows][:, :, None]
-        return self._fluid.coupled.factored(Stiffness(band, pairs._replace(blocks=blocks)))
+        return self._fluid.coupled.factored(Stiffness(stiffness.band, stiffness.pairs.held(at, self._n)))
 
     def _supports(
         self, carried: Carried, force: np.ndarray, first: Done, each: Done, rows: Rows | None

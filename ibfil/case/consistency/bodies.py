@@ -93,8 +93,6 @@ def _filament(key: str, filament: Filament) -> Iterator[Fault]:
     if isinstance(filament.shape, RunShape):
         found = '"run" for a filament in a body, whose pose it does not tell'
         yield Fault(f"{key}.shape.kind", found, "another kind of shape; a run goes on with ibfil run --resume", reads)
-    if filament.closed:
-        yield Fault(f"{key}.closed", "true for a filament in a body", "false", reads)
 
 
 # --- a body ----------------------------------------------------------------------------------------------------------
@@ -153,5 +151,3 @@ def _fluid(case: Scene, key: str) -> Iterator[Fault]:
         yield Fault(
             "fluid.cells", f"{shown(fluid.cells)}, a plane flow, with bodies", "a box in three dimensions", (key,)
         )
-    if fluid.thick:
-        yield Fault("fluid.thick", "true in a scene with bodies on a grid", "false", (key,))
