@@ -11,7 +11,9 @@ from ibfil.analysis.run import open_run
 from ibfil.io.reader import RunFile
 from ibfil.visualization import render
 from ibfil.visualization.bodies import LEGEND, outline
+from ibfil.visualization.moments import Look
 from ibfil.visualization.pictures import Pictures, Wish
+from ibfil.visualization.run_figure import figure
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
 from ibfil.visualization.web.page import RING, _strokes, write_page
@@ -97,6 +99,18 @@ def test_an_outline_is_the_shadow_of_the_surface(path):
     seen = (found.points[of] - body.position)[:, [0, 2]]
     inside = np.einsum("ki,ij,kj->k", seen, inverse, seen)
     assert 0.98 < inside.max() < 1.0 + 1e-5
+
+
+@pytest.mark.parametrize("co_moving", [False, True])
+def test_outlines_of_a_figure_stay_with_their_rods(path, co_moving):
+    """The rod begins in the head, whose centre is as far from there as it is in the run."""
+    with RunFile(path) as file:
+        shapes = figure(file, Look(shapes=3, co_moving=co_moving)).axes[0]
+        plane = ["xyz".index(label[0]) for label in (shapes.get_xlabel(), shapes.get_ylabel())]
+        wanted = (file.bodies["head"]["position"][-1] - file.filaments["rod"]["position"][-1, 0])[plane]
+        names = [*file.filaments, *file.bodies]
+    drawn = {name: lines.get_segments()[-1] for name, lines in zip(names, shapes.collections, strict=False)}
+    np.testing.assert_allclose(drawn["head"][:-1].mean(axis=0) - drawn["rod"][0], wanted, atol=1e-9)
 
 
 def test_paraview_files_have_the_bodies_of_every_output(path, tmp_path):
