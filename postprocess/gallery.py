@@ -72,7 +72,7 @@ def entry(shipped: library.Shipped) -> str:
         f"![{shipped.name}](../postprocess/pictures/cases/{shipped.name}.png)",
         "",
         f"{shipped.title}.",
-        f"{shipped.source}." if shipped.source.startswith("After ") else f"After {shipped.source}.",
+        f"Source: {shipped.source}.",
         f"`{first}`: expected {check.expected}, found {float(check.found):.6g}{verdict}, in {took}.",
         "",
     ]

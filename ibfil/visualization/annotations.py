@@ -55,12 +55,23 @@ def lettered(view: np.ndarray, height: int, words: Words, time: str) -> np.ndarr
     for i, bar in enumerate(words.bars):
         left = 0.28 * width + i * share
         _colour_bar(page, pen, small, (round(left), foot), round(share - 4 * edge), height, bar)
-    if words.note:
-        at = (width - edge, foot - 0.012 * height)
-        left, up, right, low = pen.textbbox(at, words.note, small, "rb")
+    for k, line in enumerate(reversed(_lines(pen, words.note, small, width - 2 * edge))):
+        at = (width - edge, foot - (0.012 + 0.034 * k) * height)
+        left, up, right, low = pen.textbbox(at, line, small, "rb")
         pen.rectangle([(left - 6, up - 4), (right + 6, low + 4)], LIGHT)
-        pen.text(at, words.note, INK, small, "rb")
+        pen.text(at, line, INK, small, "rb")
     return np.asarray(page)
+
+
+def _lines(pen: ImageDraw, note: str, font: FreeTypeFont, room: float) -> list[str]:
+    """A note in lines that fit, a new one where a part of it ends."""
+    lines: list[str] = []
+    for part in filter(None, note.split("; ")):
+        if lines and pen.textlength(f"{lines[-1]}; {part}", font) <= room:
+            lines[-1] += f"; {part}"
+        else:
+            lines.append(part)
+    return lines
 
 
 def _font(size: int) -> FreeTypeFont:

@@ -40,16 +40,25 @@ def add_bodies(show: Callable[..., object], run: Run, output: int) -> None:
 
 
 def add_outlines(
-    axes: Axes, run: RunFile, plane: tuple[int, int], picked: np.ndarray, colours: Colormap, span: tuple[float, float]
+    axes: Axes,
+    run: RunFile,
+    plane: tuple[int, int],
+    picked: np.ndarray,
+    colours: Colormap,
+    span: tuple[float, float],
+    origin: np.ndarray | float = 0.0,
 ) -> None:
-    """Adds the outlines of bodies, seen along the normal of a plane of two lab axes, coloured by time as rods are."""
+    """Adds the outlines of bodies, seen along the normal of a plane of two lab axes, coloured by time as rods are.
+
+    ``origin``: of the picture at each picked output (K, 3).
+    """
     from matplotlib.collections import LineCollection
 
     for name, columns in run.bodies.items():
         size = np.array(run.case.bodies[name].shape.semi_axes)
         if not size.any():
             continue
-        centre = np.asarray(columns["position"])[picked]
+        centre = np.asarray(columns["position"])[picked] - origin
         turned = np.stack([np.asarray(columns[key])[picked] for key in ("e1", "e2", "e3")], axis=1)
         seen = (centre[:, list(plane)], size[:, None] * turned[:, :, list(plane)])
         rings = [middle + outline(arms) for middle, arms in zip(*seen, strict=True)]

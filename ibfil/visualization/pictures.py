@@ -69,8 +69,8 @@ class Pictures:
         if wish.flow in ("slice", "streamlines"):
             most = words_with_unit("speed of the fluid", "length/time", run)
             bars.append(Scale("", most, FLOW, 0.0, self.fastest, above=len(shown) > 1))
-        notes = [_NOTES.get(wish.flow, "").format(self.fastest), _of_thickness(run), _of_links(run, strongest)]
-        notes += [LEGEND] if run.bodies else []
+        notes = [_NOTES.get(wish.flow, "").format(self.fastest), _of_thickness(run)]
+        notes += [_left_out(run)] if wish.montage else [_of_links(run, strongest), LEGEND if extents(run) else ""]
         if min(float(radius.min()) for radius in thick) < self.stage.least:
             notes.append(f"rods drawn {LEAST:g} pixels wide where they are thinner")
         title = " ".join(run.case.title.split()) or run.path.stem
@@ -153,7 +153,8 @@ class Pictures:
         picked = np.unique([self.run.output_at(t) for t in np.linspace(times[0], times[-1], self.wish.montage)])
         to_scale = [self.stage.shape(int(output), self.scale) for output in picked]
         if not all(to_scale):
-            self.words = self.words._replace(note="rods drawn thinner than they are")
+            notes = filter(None, (self.words.note, "rods drawn thinner than they are"))
+            self.words = self.words._replace(note="; ".join(notes))
         self._flow(float(times[picked[-1]]))
         return self._page(f"{len(picked)} shapes, {_time(times[0], self.run)} to {times[-1]:.4g}")
 
@@ -188,6 +189,12 @@ def _of_links(run: Run, strongest: float) -> str:
         return ""
     units = "" if run.case.units.force == "1" else f" {run.case.units.force}"
     return f"links: the darker the larger their force, black at {strongest:.3g}{units}"
+
+
+def _left_out(run: Run) -> str:
+    """The note on what many shapes in one picture go without."""
+    found = [word for word, there in (("links", run.links), ("bodies", extents(run))) if there]
+    return f"without {' and '.join(found)}" if found else ""
 
 
 def _of_thickness(run: Run) -> str:

@@ -66,9 +66,9 @@ def figure(run: RunFile, look: Look | None = None) -> Figure:
     seen, series = moments(run, look), panels(run)
     every = [np.asarray(arrays["position"]) for arrays in run.filaments.values()]
     shown = [position[seen.shapes] for position in every]
+    middle = run_panels.centroid(shown) * look.co_moving
+    shown = [position - middle for position in shown]
     if look.co_moving:
-        middle = run_panels.centroid(shown)
-        shown = [position - middle for position in shown]
         seen = seen._replace(words=f"{seen.words}, from their centroid")
     plane = plane_of_motion([position[seen.span] for position in every])
     number = _field(run, float(run.time[seen.span.stop - 1]))
@@ -82,7 +82,7 @@ def figure(run: RunFile, look: Look | None = None) -> Figure:
     fig.suptitle(title, x=0.012, ha="left", fontsize=11.5, fontweight="bold")
     left = columns[0].subgridspec(len(rows), 1, height_ratios=heights)
     make: dict[str, Any] = {
-        "shapes": lambda axes: run_panels.shapes(fig, axes, run, seen, shown, plane),
+        "shapes": lambda axes: run_panels.shapes(fig, axes, run, seen, shown, plane, middle),
         "path": lambda axes: run_panels.paths(axes, run, seen, every, plane),
         "curvature": lambda axes: run_panels.curvature(fig, axes, run, seen),
         "flow": lambda axes: run_panels.flow(fig, axes, run, number or 0, every, plane),

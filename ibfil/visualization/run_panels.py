@@ -67,9 +67,15 @@ def reach(positions: Sequence[np.ndarray], plane: tuple[int, int]) -> tuple[floa
 
 
 def shapes(
-    fig: Figure, axes: Axes, run: RunFile, seen: Moments, positions: Sequence[np.ndarray], plane: tuple[int, int]
+    fig: Figure,
+    axes: Axes,
+    run: RunFile,
+    seen: Moments,
+    positions: Sequence[np.ndarray],
+    plane: tuple[int, int],
+    middle: np.ndarray,
 ) -> None:
-    """Every filament at the picked moments (K, N, 3), coloured by time."""
+    """Every filament at the picked moments (K, N, 3), seen from ``middle`` (K, 1, 3), coloured by time; and bodies."""
     from matplotlib.collections import LineCollection
 
     times = np.asarray(run.time)[seen.shapes]
@@ -79,7 +85,7 @@ def shapes(
         lines.set_array(times)
         lines.set_clim(times[0], times[-1])
         axes.add_collection(lines)
-    add_outlines(axes, run, plane, seen.shapes, _time_colours(), (times[0], times[-1]))
+    add_outlines(axes, run, plane, seen.shapes, _time_colours(), (times[0], times[-1]), middle[:, 0])
     axes.autoscale_view()
     axes.margins(0.06)
     _names(axes, run, plane)

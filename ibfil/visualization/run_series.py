@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 
 SERIES = 3  # observables drawn; the rest are in --csv
-LINES = 3  # filaments with a line of their own; more are a mean and a band
+LINES = 3  # filaments, or copies, with a line of their own; more are a mean and a band
+WIDEST = 62  # letters of a title without its units
 TITLE = 60  # letters in a line with the title of a panel
 BAND = (10, 90)  # percent of filaments within the band
 DIAGNOSTICS = {
@@ -45,9 +46,8 @@ def panels(run: RunFile) -> list[Panel]:
     """The panels of a run, over all its outputs."""
     series = []
     for name, column in list(run.observables.items())[:SERIES]:
-        values = np.asarray(column)
-        lines = {_axis(part): line for part, line in series_parts(run.case, name, values).items()}
-        series.append(Panel(_meaning(run, name), run.units(f"observables/{name}"), lines))
+        lines = series_parts(run.case, name, np.asarray(column))
+        series.append(_observed(_meaning(run, name), run.units(f"observables/{name}"), lines))
     series += _motion(run)
     for title, parts in DIAGNOSTICS.items():
         lines = {word: np.asarray(run.diagnostics[key]) for key, word in parts.items() if key in run.diagnostics}
@@ -56,9 +56,14 @@ def panels(run: RunFile) -> list[Panel]:
     return series
 
 
-def _axis(part: str) -> str:
-    """The label of a line: an axis in the figure's words, a copy by its number."""
-    return AXES["xyz".index(part)] if part and part in "xyz" else part
+def _observed(title: str, units: str, lines: dict[str, np.ndarray]) -> Panel:
+    """The lines of an observable; of many copies' vectors, called 000_x, the mean of each component."""
+    axes = {word.partition("_")[2] for word in lines}
+    if len(lines) <= LINES or axes == {""}:
+        return _of_many(title, units, lines)
+    own = {axis: [line for word, line in lines.items() if word.endswith(axis)] for axis in AXES}
+    words = f", mean of {len(own[AXES[0]])}"
+    return Panel(_short(title, words), units, {axis: np.mean(every, axis=0) for axis, every in own.items()})
 
 
 def thermal(run: RunFile) -> bool:
@@ -78,21 +83,26 @@ def _motion(run: RunFile) -> list[Panel]:
         if energy is not None:
             energies[name] = energy
     if kicked:
-        out = [_of_filaments("distance of the centroid from its start", units.length, moves)]
+        out = [_of_many("distance of the centroid from its start", units.length, moves)]
     else:
-        out = [_of_filaments("speed of the centroid", label(units, "length/time"), moves)]
-    return out + ([_of_filaments("elastic energy", label(units, "force length"), energies)] if energies else [])
+        out = [_of_many("speed of the centroid", label(units, "length/time"), moves)]
+    return out + ([_of_many("elastic energy", label(units, "force length"), energies)] if energies else [])
 
 
-def _of_filaments(title: str, units: str, lines: dict[str, np.ndarray]) -> Panel:
-    """A line a filament, or of many the mean, in a band that most are within."""
+def _of_many(title: str, units: str, lines: dict[str, np.ndarray]) -> Panel:
+    """A line a filament or copy, or of many the mean, in a band that most are within."""
     if len(lines) == 1:
         return Panel(title, units, {"": next(iter(lines.values()))})
     if len(lines) <= LINES:
         return Panel(title, units, lines)
     every = np.array(list(lines.values()))
-    words = f"{title}, mean of {len(lines)}, band {BAND[0]} to {BAND[1]} %"
-    return Panel(words, units, {"": every.mean(axis=0)}, np.percentile(every, BAND, axis=0))
+    words = f", mean of {len(lines)}, band {BAND[0]} to {BAND[1]} %"
+    return Panel(_short(title, words), units, {"": every.mean(axis=0)}, np.percentile(every, BAND, axis=0))
+
+
+def _short(title: str, more: str = "") -> str:
+    """A title that fits above its panel, and more words that are not cut."""
+    return textwrap.shorten(title, WIDEST - len(more), placeholder=" ...") + more
 
 
 def _meaning(run: RunFile, name: str) -> str:
@@ -111,7 +121,7 @@ def _meaning(run: RunFile, name: str) -> str:
     known = run.case.observe.items()
     own, observe = next(((own, one) for own, one in known if one.recorded(own) == name), (name, None))
     fit = f" ({observe.kind})" if observe is not None and KINDS[observe.kind].number else ""
-    return textwrap.shorten(f"{own}{fit}: {words}", 62, placeholder=" ...")
+    return _short(f"{own}{fit}: {words}")
 
 
 def against_time(axes: Axes, run: RunFile, panel: Panel, seen: Moments) -> None:

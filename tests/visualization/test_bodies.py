@@ -9,10 +9,14 @@ from helpers.runs import BODIES, FLUIDS, real, rod, run
 from ibfil.analysis.body_meshes import BEYOND, body_surfaces, extents
 from ibfil.analysis.run import open_run
 from ibfil.io.reader import RunFile
-from ibfil.visualization.bodies import outline
+from ibfil.visualization import render
+from ibfil.visualization.bodies import LEGEND, outline
+from ibfil.visualization.moments import Look
+from ibfil.visualization.pictures import Pictures, Wish
+from ibfil.visualization.run_figure import figure
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
-from ibfil.visualization.web.page import RING, _strokes
+from ibfil.visualization.web.page import RING, _strokes, write_page
 
 SIZE = np.array([0.2, 0.15, 0.1])
 
@@ -68,7 +72,8 @@ def test_vtkhdf_has_the_surfaces_and_axes_of_every_time(path, tmp_path):
                 np.testing.assert_array_equal(found[name], known[name])
 
 
-def test_a_page_has_rings_on_the_body(path):
+def test_a_page_has_rings_on_the_body_and_says_what_they_are(path, tmp_path):
+    assert '"linewords": "rings: bodies"' in write_page(path, tmp_path / "run.html", log=str).read_text()
     with open_run(path) as run:
         rings = _strokes(run, np.array([len(run) - 1]))[0]
         body = run.snapshot(-1).bodies["head"]
@@ -96,6 +101,18 @@ def test_an_outline_is_the_shadow_of_the_surface(path):
     assert 0.98 < inside.max() < 1.0 + 1e-5
 
 
+@pytest.mark.parametrize("co_moving", [False, True])
+def test_outlines_of_a_figure_stay_with_their_rods(path, co_moving):
+    """The rod begins in the head, whose centre is as far from there as it is in the run."""
+    with RunFile(path) as file:
+        shapes = figure(file, Look(shapes=3, co_moving=co_moving)).axes[0]
+        plane = ["xyz".index(label[0]) for label in (shapes.get_xlabel(), shapes.get_ylabel())]
+        wanted = (file.bodies["head"]["position"][-1] - file.filaments["rod"]["position"][-1, 0])[plane]
+        names = [*file.filaments, *file.bodies]
+    drawn = {name: lines.get_segments()[-1] for name, lines in zip(names, shapes.collections, strict=False)}
+    np.testing.assert_allclose(drawn["head"][:-1].mean(axis=0) - drawn["rod"][0], wanted, atol=1e-9)
+
+
 def test_paraview_files_have_the_bodies_of_every_output(path, tmp_path):
     write_vtk(path, tmp_path)
     with RunFile(path) as file:
@@ -103,3 +120,14 @@ def test_paraview_files_have_the_bodies_of_every_output(path, tmp_path):
     assert len(list(tmp_path.glob("run_bodies_*.vtp"))) == count
     assert (tmp_path / "run_bodies.pvd").exists()
     assert "Block1" in (tmp_path / "run_paraview.py").read_text()
+
+
+@pytest.mark.skipif(not render.can_render(), reason=f"no off-screen rendering here ({render.PACKAGES})")
+def test_a_picture_of_many_shapes_says_that_it_has_no_bodies(path):
+    with open_run(path) as run:
+        for wish, told in ((Wish(montage=3), "without bodies"), (Wish(), LEGEND)):
+            pictures = Pictures(run, wish, [0])
+            if wish.montage:
+                pictures.montage()
+            pictures.close()
+            assert [note for note in (LEGEND, "without bodies") if note in pictures.words.note] == [told]

@@ -84,12 +84,35 @@ def test_thermal_runs_show_no_velocity_and_no_power(tmp_path):
 
 def test_many_filaments_are_a_mean_and_a_band(tmp_path):
     lines = {str(k): np.array([k, 2.0 * k]) for k in range(1, 12)}
-    panel = run_series._of_filaments("energy", "J", lines)
+    panel = run_series._of_many("energy", "J", lines)
     np.testing.assert_allclose(panel.lines[""], [6, 12])
     np.testing.assert_allclose(panel.band, [[2, 4], [10, 20]])
     assert "mean of 11" in panel.title
-    few = run_series._of_filaments("energy", "J", dict(list(lines.items())[:3]))
+    few = run_series._of_many("energy", "J", dict(list(lines.items())[:3]))
     assert (list(few.lines), few.band) == (["1", "2", "3"], None)
+
+
+def test_many_copies_are_a_mean_and_a_band_and_their_vectors_a_mean(tmp_path, recwarn):
+    of_all = {"kind": "position", "filament": "rod", "copies": "all", "along": [0, 1, 0], "at": "start"}
+    keys = {
+        "filament.rod.copies": {"count": 5, "at": [0, "0.4*i", 0], "phase": 0},
+        "expect": {},
+        "observe": {"where": of_all, "moved": {"kind": "drift", "filament": "rod", "copies": "mean"}},
+    }
+    ibfil.run(parse_case(BENT, "scene", keys), tmp_path / "run.h5")
+    with RunFile(tmp_path / "run.h5") as run:
+        place, moved = sorted(run_series.panels(run)[:2], key=lambda panel: panel.band is None)
+        every, each = np.asarray(run.observables["where"]), np.asarray(run.observables["moved.position"])
+        run_figure.draw(run, tmp_path / "run.png")  # whose panels do not shrink to nothing under a legend of all
+    np.testing.assert_allclose(place.lines[""], every.mean(axis=1))
+    np.testing.assert_allclose(place.band, np.percentile(every, run_series.BAND, axis=1))
+    assert place.title.startswith("where: ")
+    assert place.title.endswith(", mean of 5, band 10 to 90 %")
+    assert len(place.title) <= run_series.WIDEST
+    assert each.shape[1:] == (5, 3)
+    for k, axis in enumerate("xyz"):
+        np.testing.assert_allclose(moved.lines[axis], each[:, :, k].mean(axis=1))
+    assert "constrained_layout" not in "".join(str(one.message) for one in recwarn)
 
 
 @pytest.mark.parametrize("flow", [True, False])

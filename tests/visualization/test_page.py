@@ -85,6 +85,7 @@ def test_links_are_in_it_from_end_to_end(tmp_path):
         link = opened.links["spring"]
         ends = np.stack([np.asarray(link["first"]), np.asarray(link["second"])], axis=2)
     assert data["links"] == ends.shape[1]
+    assert data["linewords"] == "lines: links"
     share = unpacked(data["linked"], "<u2").reshape(ends.shape) / 65535
     places = np.array(data["low"]) + share * np.array(data["span"])
     np.testing.assert_allclose(places, ends, atol=0.51 / 65535 * np.max(data["span"]))

@@ -95,6 +95,17 @@ def test_letters_stand_in_bands_of_their_own():
     assert (page[240 - foot :] < 100).any()
 
 
+def test_a_note_that_is_too_long_goes_on_in_a_line_above():
+    view, heights = np.full((192, 320, 3), 128, np.uint8), []
+    parts = ["links: the darker the larger", "axes of bodies: first red", "drawn wider"]
+    for note in (parts[0], "; ".join(3 * parts)):
+        page = lettered(view, 240, Words("", (), "um", 0.01, note), "t")
+        inked = (page[bands(240)[0] : -bands(240)[1]] != 128).any(axis=2)
+        assert not inked[:, :4].any()
+        heights.append(np.count_nonzero(inked.any(axis=1)))
+    assert heights[1] > 1.5 * heights[0]
+
+
 # --- pictures ---------------------------------------------------------------------------------------------------------
 
 

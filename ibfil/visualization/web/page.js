@@ -277,6 +277,7 @@ part("case").textContent = run.casetext;
 part("slider").max = outputs - 1;
 part("flowtool").hidden = sheets === null;
 part("boxtool").hidden = run.box === null;
+part("linewords").textContent = run.linewords;
 if (sheets) part("flowwords").textContent = run.flow.words;
 run.quantities.forEach((q, k) => {
   const one = document.createElement("option");

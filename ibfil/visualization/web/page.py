@@ -104,7 +104,8 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
     low, high = both.min(axis=(0, 1)), both.max(axis=(0, 1))
     span = np.where(high > low, high - low, 1.0)
     radii = np.concatenate([rod.radius for rod in rods_of(run).values()])
-    look = turned(viewpoint(every), None, None, upwards(run.case))
+    ends = [each[picked] for each in extents(run)]
+    look = turned(viewpoint([*every, *ends]), None, None, upwards(run.case))
     box, units = box_of(run), run.case.units
     return {
         "title": printable(" ".join(run.case.title.split()) or run.path.stem),
@@ -115,6 +116,7 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
         "counts": [p.shape[1] for p in every],
         "positions": _packed(np.round((places - low) / span * 65535), "<u2"),
         "links": links.shape[1],
+        "linewords": "; ".join(["lines: links"] * bool(run.links) + ["rings: bodies"] * bool(ends)),
         "linked": _packed(np.round((links - low) / span * 65535), "<u2"),
         "radius": _packed(radii, "<f4"),
         "low": low.tolist(),
