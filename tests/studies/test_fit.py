@@ -6,45 +6,13 @@ import json
 
 import numpy as np
 import pytest
+from helpers.swung import BOUNDS, SWUNG, TRUTH, table
 
 import ibfil
 from ibfil.commands import main
 from ibfil.errors import CaseError, RunFailed
 from ibfil.io.reader import RunFile
 from ibfil.studies.fit.study import fit
-
-SWUNG = """
-title = "A clamped rod swung to and fro"
-source = "a twin"
-units = { length = "um", time = "s" }
-[parameters]
-A = 1.3
-zeta = 12.0
-amplitude = 0.16
-[filament.rod]
-length = 1.0
-nodes = 11
-bending = "A"
-stretching = "500*A"
-direction = [1, 0, 0]
-[filament.rod.start]
-end = "clamped"
-moves = [0, "amplitude*sin(2*pi*t)", 0]
-[fluid]
-model = "rft"
-viscosity = 1.0
-drag = { perp = "zeta", par = "zeta/1.8" }
-[time]
-end = 1
-step = 0.02
-[output]
-every = 0.1
-[observe.tip]
-kind = "position"
-at = "finish"
-"""
-TRUTH = {"parameters.A": 1.0, "parameters.zeta": 12.0, "parameters.amplitude": 0.2}
-BOUNDS = {"parameters.A": (0.2, 5.0), "parameters.amplitude": (0.02, 1.0)}
 
 
 @pytest.fixture(scope="module")
@@ -62,19 +30,6 @@ def track(case):
         return np.asarray(run.position("rod"))[1:], run.time[1:], run.arclength("rod")
 
 
-def table(track, noise=0.0, seed=0, turn=0.0):
-    """Every second node in nanometres and milliseconds, turned and noisy."""
-    position, time, s = track
-    rng = np.random.default_rng(seed)
-    c, d = np.cos(turn), np.sin(turn)
-    rows = ["t_ms,s_um,x_nm,y_nm"]
-    for points, t in zip(position, time, strict=True):
-        for (x, y, _), at in zip(points[::2].tolist(), s[::2].tolist(), strict=True):
-            x, y = 1e3 * (np.array([c * x - d * y, d * x + c * y + turn]) + noise * rng.normal(size=2))
-            rows.append(f"{1e3 * float(t)!r},{at!r},{float(x)!r},{float(y)!r}")
-    return "\n".join(rows) + "\n"
-
-
 def test_without_noise_the_truth_comes_back_and_a_cut_fit_goes_on(case, track, tmp_path, capsys):
     data = tmp_path / "tracked.csv"
     data.write_text(table(track))
@@ -85,7 +40,7 @@ def test_without_noise_the_truth_comes_back_and_a_cut_fit_goes_on(case, track, t
     found = json.loads((tmp_path / "out" / "fit.json").read_text())
     for one in found["parameters"]:
         assert one["value"] == pytest.approx(TRUTH[one["key"]], rel=1e-6)
-    assert found["runs"] <= 35  # three a look of two parameters, and two
+    assert found["runs"] <= 37  # three a look of two parameters, two, and a finer step and more nodes
     assert "A=1 " in out
     assert {"fit.csv", "fit.png", "fit.pdf"} <= {path.name for path in (tmp_path / "out").iterdir()}
     runs = sorted((tmp_path / "out" / "runs").iterdir())
@@ -106,6 +61,7 @@ def test_noise_has_intervals_and_a_turned_camera_is_turned_back(case, track, tmp
         assert 0.001 < one.half_width < 0.3
     assert result.rms == pytest.approx(0.005 * 2**0.5, rel=0.2)
     assert result.spread.blocks > 4
+    assert result.notes == ()
     alone = {"parameters.amplitude": BOUNDS["parameters.amplitude"]}
     straight = fit(str(case), alone, tmp_path / "not_turned", data, log=str)
     assert straight.rms > 5 * result.rms

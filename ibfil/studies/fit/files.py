@@ -32,7 +32,7 @@ def rows(result: Fit) -> list[dict[str, Any]]:
 
 
 def details(result: Fit) -> dict[str, Any]:
-    """Everything, ready for JSON. Covariances are of logarithms where ``by_log``, else of the value over its range."""
+    """Everything, ready for JSON. Covariances and errors are of logarithms where ``by_log``, else of value/range."""
     spread, data = result.spread, result.data
     return {
         "title": result.title,
@@ -43,6 +43,9 @@ def details(result: Fit) -> dict[str, Any]:
             {**row, "bounds": [one.parameter.low, one.parameter.high], "by_log": one.parameter.by_log}
             for row, one in zip(rows(result), result.parameters, strict=True)
         ],
+        "errors_of_the_run": {
+            name: error if isinstance(error, str) else error.tolist() for name, error in result.numerical.items()
+        },
         "level": 0.95,
         "half_width_in_standard_errors": spread.factor,
         "covariance": spread.covariance.tolist(),

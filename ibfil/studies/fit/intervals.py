@@ -99,6 +99,11 @@ def _inverse(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return known.T @ known, free.T @ free
 
 
+def moved(jacobian: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """How far the least squares moves (p,) where the residuals change (n,), to first order; J (n, p)."""
+    return np.asarray(-_inverse(jacobian)[0] @ jacobian.T @ change)
+
+
 def weakest(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The singular values (p,) of J (n, p), largest first, and the direction (p,) of the least."""
     _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)

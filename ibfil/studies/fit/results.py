@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .intervals import Spread
     from .residuals import Seen
 
+Errors = dict[str, "np.ndarray | str"]  # of step and nodes: (p,) as in the search, or why it is not known
 _UNSETTLED = 1.0  # half-width over value
 _TIED = 0.9  # correlation
 
@@ -73,6 +74,7 @@ class Fit:
     seen: list[Seen]
     observables: dict[str, tuple[float, float, float]]  # measured, its error, the run's
     runs: int
+    numerical: Errors  # of the parameters, from step and nodes
     converged: bool
     unit: str
     time_unit: str

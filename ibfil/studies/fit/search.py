@@ -78,6 +78,10 @@ class Search:
             self._known[values] = (self._measure(outcome) if outcome.done else None, outcome)
         return [self._known[values][0] for values in wanted]
 
+    def beside(self, members: Sequence[Member]) -> list[tuple[Outcome, np.ndarray | None]]:
+        """Other runs than those of parameters: how each ended, and its residuals (n,), None where it failed."""
+        return [(one, self._measure(one) if one.done else None) for one in self._make(members)]
+
     def outcome(self, inner: np.ndarray) -> Outcome:
         """How the run there ended."""
         return self._known[self.values(inner)][1]

@@ -28,7 +28,9 @@ from . import files
 from .data import Data, read
 from .intervals import memory, spread, weakest
 from .residuals import ALIGNED, Seen, look, residuals
-from .results import Fit, Parameter, fitted, tied
+from .resolution import errors
+from .resolution import notes as too_coarse
+from .results import Errors, Fit, Parameter, fitted, tied
 from .search import Found, Search, search
 
 if TYPE_CHECKING:
@@ -107,7 +109,7 @@ def fit(
     runs = Search(whole, changes, parameters, _maker(folder / RUNS, jobs, executor, log), target.of)
     runs.member(runs.values(start)).resolved()  # a key that the case does not have
     found = search(runs, start)
-    result = _result(base, parameters, target, found)
+    result = _result(base, parameters, target, found, errors(runs, found))
     files.write(result, folder)
     return result
 
@@ -213,7 +215,7 @@ def _at_times(case: Case, times: list[float], observed: bool) -> tuple[str, ...]
     return ("output.every=absent", f"output.times={[float(time) for time in kept]}")
 
 
-def _result(case: Case, parameters: list[Parameter], target: _Target, found: Found) -> Fit:
+def _result(case: Case, parameters: list[Parameter], target: _Target, found: Found, off: Errors) -> Fit:
     with RunFile(found.outcome.path) as run:
         seen, own = target.seen(run), target.found(run)
     data, error = target.data, target.error
@@ -232,11 +234,11 @@ def _result(case: Case, parameters: list[Parameter], target: _Target, found: Fou
     notes = list(data.notes if data is not None else ())
     if data is not None and bars.blocks == 0:
         notes.append("too few frames to see how noise goes together: points are taken as independent of each other")
+    told = tuple(fitted(p, float(x), float(h)) for p, x, h in zip(parameters, found.inner, bars.half, strict=True))
+    notes += too_coarse(off, told, bars.half)
     return Fit(
         title=case.title,
-        parameters=tuple(
-            fitted(p, float(x), float(h)) for p, x, h in zip(parameters, found.inner, bars.half, strict=True)
-        ),
+        parameters=told,
         spread=bars,
         singular=sizes,
         tied=tuple(tied(parameters, bars, sizes, direction)),
@@ -246,7 +248,8 @@ def _result(case: Case, parameters: list[Parameter], target: _Target, found: Fou
         data=data,
         seen=seen,
         observables={name: (*target.observables[name], own[name]) for name in own},
-        runs=found.runs,
+        runs=found.runs + len(off),
+        numerical=off,
         converged=found.converged,
         unit=label(case.units, "length"),
         time_unit=label(case.units, "time"),
