@@ -137,10 +137,11 @@ class _Response:
         return target if self.flow is None else target + self.tau * self.flow
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
-        base = self._carried(target)
-        y = base + self.tau * mobilize(self.drag, self.e3, force)
-        y.ravel()[held.at] = held.value
-        felt = resist(self.drag, self.e3, (y - base) / self.tau)
+        with np.errstate(invalid="ignore"):  # a flow or force without a value ends the step, which tells its node
+            base = self._carried(target)
+            y = base + self.tau * mobilize(self.drag, self.e3, force)
+            y.ravel()[held.at] = held.value
+            felt = resist(self.drag, self.e3, (y - base) / self.tau)
         return Solution(y, felt, _at(held, felt - force))
 
     def implicit(

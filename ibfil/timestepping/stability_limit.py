@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +10,6 @@ from ..fluids.base import Fluid
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
 from ..rods.system import RodSystem
-
-if TYPE_CHECKING:
-    pass
-
 
 _SETTLED = 0.01  # of the explicit limit, where it depends on the step itself
 
@@ -27,6 +22,7 @@ def explicit_limit(
     K is the exact Jacobian, M the fluid's. Stops when an iteration changes the estimate by 1e-5: with the stiffest
     modes close together, some hundreds of iterations, it is then within 1 %. A fluid with inertia moves the more the
     longer the step is, up to Stokes flow: then it is the step dt with dt = 2/rho(M(dt) K), which errs on the safe side.
+    Infinite where no force answers to a move, and where a force or the flow has no value, which a step then tells.
     """
     force, inner = system.forces(configuration, time)
     matrix = system.stiffness(configuration, configuration, inner, time)
@@ -45,7 +41,7 @@ def explicit_limit(
         if last and abs(float(np.linalg.norm(moved(x / np.linalg.norm(x)))) - last) < _SETTLED * last:
             return 2.0 / last
         last, x = _radius(moved, x, iterations)
-        if last == 0.0:
+        if last == 0.0 or not np.isfinite(last):
             return np.inf
         dt = float(np.sqrt(dt * 2.0 / last)) if dt != 1.0 else 2.0 / last
 
@@ -57,8 +53,8 @@ def _radius(moved: Callable[[np.ndarray], np.ndarray], x: np.ndarray, iterations
         x = x / np.linalg.norm(x)
         y = moved(x)
         new = float(np.linalg.norm(y))
-        if new == 0.0:
-            return 0.0, x
+        if new == 0.0 or not np.isfinite(new):
+            return new, x
         settled, radius, x = abs(new - radius) < 1e-5 * new, new, y
         if settled:
             break

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.bacterium import cell
 
 from ibfil.bodies.resistance import ellipsoid
 from ibfil.case.reading import parse_case
 from ibfil.fluids.resistive_force import resist
 from ibfil.simulation.simulation import Simulation
-
-from ..helpers.bacterium import cell
 
 CASE = """
 {cell}{more}

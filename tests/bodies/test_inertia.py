@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from ..helpers.bacterium import BOX, bacterium
+from helpers.bacterium import BOX, bacterium
 
 INERTIAL = BOX.replace('"stokes"', '"navier-stokes"') + "\ndensity = {density}"
 

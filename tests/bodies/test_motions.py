@@ -81,6 +81,17 @@ def test_the_heat_of_drag_is_the_power_where_the_fluid_is_at_rest():
     assert now.bodies["b"].power > 0.01 * own
 
 
+def test_in_a_flow_a_body_turns_part_of_its_power_into_heat():
+    """That of its drag; the other is done upon the flow about it, a stream (1, 0, 0) that turns at 2."""
+    flow = 'flow = ["where(y < 5, 1 - 2*y, 0)", "where(y < 5, 2*x, 0)", "0"]'  # none about the rod
+    sim = scene(body(more="force = [2, 0, 0]\ntorque = [0, 0, 3]") + '[observe.d]\nkind = "dissipation"\n', flow=flow)
+    found = sim.snapshot().diagnostics
+    heat = 2**2 / (6 * np.pi * 2.0 * 0.3) + 3**2 / (8 * np.pi * 2.0 * 0.3**3)
+    assert found["dissipation"] == pytest.approx(heat, rel=1e-9)
+    assert found["background_power"] == pytest.approx(2 * 1 + 3 * 2, rel=1e-9)
+    assert found["power"] == pytest.approx(heat + 8, rel=1e-9)
+
+
 def test_an_ellipsoid_in_a_shear_turns_as_jeffery_says():
     """Half of the period 2 pi (r + 1/r)/rate later it points the other way, and half way it did not in between."""
     period = 2 * np.pi * (3 + 1 / 3)

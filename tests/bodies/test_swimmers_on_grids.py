@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.bacterium import BOX, FREE, WALL, bacterium
 
 from ibfil.case.reading import parse_case
 from ibfil.errors import CaseError
 from ibfil.fluids.shells.calibration import fitted
 from ibfil.simulation.simulation import Simulation
-
-from ..helpers.bacterium import BOX, FREE, WALL, bacterium
 
 SWIMMER = """
 [filament.tail]
@@ -101,17 +100,22 @@ def test_a_bacterium_moves_as_the_rigid_one(fluid):
     np.testing.assert_allclose(head.force, felt[sim.system.rows.n :, :3].sum(axis=0), atol=2e-2 * largest)
 
 
-def test_power_becomes_heat_and_the_flow_is_that_of_all():
-    """Of nodes and markers, recovered from the body's force and torque; a probe on a marker moves with the body."""
+@pytest.mark.parametrize(("rotation", "flow"), [("grid", "0"), ("local", "3 + 2*sin(pi*x)")])
+def test_power_becomes_heat_and_the_flow_is_that_of_all(rotation, flow):
+    """Of nodes and markers, recovered from the body's force and torque; a probe on a marker moves with the body.
+
+    In a flow they do work upon it too, and that of markers is as large as that of nodes.
+    """
     for fluid in (BOX, FREE):
-        sim = bacterium(fluid + '\nrotation = "grid"')
+        sim = bacterium(fluid + f'\nrotation = "{rotation}"\nflow = ["0", "{flow}", "{flow}"]')
         sim.advance(0.04, lambda: None)
         step = sim.attempt(0.02)
         there, shells, rows = step.there, sim.fluid.immersed.shells, sim.system.rows
         found = sim.model.fluid_model.output(sim.rods, sim.fluid)
         heat = found.dissipation(there, step.velocity, step.force, 0.06)
         power = float(np.sum(step.velocity * step.force))
-        assert heat["dissipation"] == pytest.approx(power, rel=1e-9)
+        assert heat["dissipation"] + heat["background_power"] == pytest.approx(power, rel=1e-9)
+        assert (abs(heat["background_power"]) > 1e-3 * power) == (flow != "0")
         assert heat["grid_power"] == pytest.approx(heat["flow_dissipation"], rel=1e-9)
         marks = shells.places(there.r, there.e3)[::7]
         u = sim.fluid.velocity_at(marks, there.r, there.e3, step.force, 0.06)

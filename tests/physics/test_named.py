@@ -60,6 +60,7 @@ def test_diverged_or_over_stretched_by_a_step_above_the_explicit_limit():
     assert "time.scheme=implicit" in told[2]
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize(
     "key",
     ["filament.rod.loads.force=['0*x', '1 + 1e-9/(s - 0.5)', 0]", "fluid.flow=[0, 'where(abs(x) < 1e-3, 1/x, 0)', 0]"],
@@ -68,6 +69,16 @@ def test_the_node_where_a_load_or_a_flow_has_no_value_is_told(key):
     """A correction has no value anywhere then, and node 0 was blamed."""
     straight = ["filament.rod.curvature=[0, 0]", "filament.rod.shape={kind='straight'}", "filament.rod.nodes=21"]
     assert "on filament rod, node 10: " in str(failed(key, *straight, "time.step=1e-3"))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("step", ["1e-3", "auto"])
+def test_where_a_force_has_no_value_the_limit_of_explicit_steps_is_not_sought_for_ever(step):
+    key = "filament.rod.loads.force=['0*x', '1 + 1e-9/(s - 0.5)', 0]"
+    straight = ["filament.rod.curvature=[0, 0]", "filament.rod.shape={kind='straight'}", "filament.rod.nodes=21"]
+    told = str(failed(key, *straight, "time.scheme=explicit", f"time.step={step}"))
+    assert "no finite number" in told
+    assert "limit" not in told
 
 
 @pytest.mark.parametrize("scheme", ["explicit", "semi-implicit", "implicit"])
