@@ -23,7 +23,9 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("--up", metavar="X,Y,Z", help="upwards in the picture (default: off a wall, against weight)")
     command.add_argument("--zoom", type=float, default=1.0, metavar="N", help="nearer, above 1")
     command.add_argument("--box", action="store_true", help="draw the periodic box")
-    command.add_argument("--wrap", action="store_true", help="bring filaments into the periodic box, cut at its faces")
+    command.add_argument(
+        "--wrap", action="store_true", help="bring filaments, but no links or bodies, into the box, cut at its faces"
+    )
     command.add_argument("--follow", metavar="NAME", help="keep this filament in the middle")
     command.add_argument("--flow", default="none", metavar="HOW", help="none, slice, glyphs or streamlines")
     command.add_argument("--montage", type=int, default=0, metavar="N", help="N shapes over the run in one picture")

@@ -17,7 +17,9 @@ def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     command.add_argument("run", metavar="RUN.h5")
     command.add_argument("-o", dest="folder", metavar="DIR", help="the folder (default: the run's name)")
-    command.add_argument("--wrap", action="store_true", help="bring filaments into the periodic box, cut at its faces")
+    command.add_argument(
+        "--wrap", action="store_true", help="bring filaments, but no links or bodies, into the box, cut at its faces"
+    )
     command.add_argument("--images", type=digit, default=0, metavar="N", help="periodic images in N boxes on each side")
     command.add_argument("--every", type=count, default=1, metavar="N", help="every N-th output only; all fields")
     command.add_argument("--hdf", action="store_true", help="as VTKHDF: one file for all times of filaments, of fields")
