@@ -14,12 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy.fft import irfftn
 
 from ..grid.far_pairs import far_pair, is_far, moments
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol
+from ..linalg.compiled import njit
 from ..linalg.vectors import NOT_NEGATIVE
 
 ALL = 2**62  # a reach that no pair is beyond
@@ -32,6 +31,8 @@ def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarr
 
     Unit force: density 1/h^3 on that cell. ``alpha`` (density over time) is zero in Stokes flow.
     """
+    from scipy.fft import irfftn
+
     symbol = StokesSymbol(*grid.wave_numbers(), viscosity, alpha)
     total, out = symbol.total * grid.spacing**3, np.empty((6, *grid.cells))
     for c, (a, b) in enumerate(COMPONENTS):

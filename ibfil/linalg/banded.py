@@ -11,11 +11,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy.linalg import solve_banded
-from scipy.linalg.lapack import dgbtrf, dgbtrs
 
 from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
+from .compiled import njit
+from .lapack import dgbtrf, dgbtrs, solve_banded
 from .vectors import NOT_NEGATIVE
 
 
@@ -134,7 +133,7 @@ def solve_pivoted(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     upper, diagonals = lapack_form(matrix)
     if not (np.isfinite(diagonals).all() and np.isfinite(right).all()):
         return np.full(right.shape, np.nan)
-    return solve_banded((upper, upper), diagonals, right.ravel(), check_finite=False).reshape(right.shape)
+    return solve_banded(upper, diagonals, right.ravel()).reshape(right.shape)
 
 
 def lapack_form(matrix: np.ndarray) -> tuple[int, np.ndarray]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..linalg.vectors import NOT_NEGATIVE, at, cross, dot, mix, plus, scaled
 from .elastic_force import Moment
 from .geometry import E1, E2, E3, EDGE, LENGTH, METRIC, O1, O2, R_S, R_SS, Configuration

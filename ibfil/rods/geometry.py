@@ -7,8 +7,8 @@ r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 =
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..linalg.vectors import NOT_NEGATIVE, at, cross, dot, plus, put, scaled
 from .frame import transported
 from .mesh import Mesh
