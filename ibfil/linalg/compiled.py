@@ -2,7 +2,7 @@
 
 Before numba reads a kernel from its cache it loads all that it could compile with, some sixty modules and scipy.linalg:
 a third of a second, of which a kernel that is compiled already has no use. Here that waits for the first kernel that
-has to be compiled. What a compiled kernel calls at run time, numba's memory, is made ready first.
+has to be compiled. Only numba's memory, which kernels call at run time, is made ready first.
 """
 
 from __future__ import annotations
