@@ -19,7 +19,7 @@ try:
     class _Kept(FunctionCache):
         """numba's cache of one function."""
 
-        def load_overload(self, sig, target_context):  # type: ignore[no-untyped-def]
+        def load_overload(self, sig, target_context):
             """The kernel of a signature; None where it is not there."""
             rtsys.initialize(target_context)
             with self._guard_against_spurious_io_errors():
