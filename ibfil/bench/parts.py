@@ -52,6 +52,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
         pieces.table_pair("peskin4", 1.0),
         pieces.table_pair("bkp6", 4.5),
         pieces.table_of_a_swimmer(),
+        pieces.swimmer_step(),
         pieces.start_up(),
     ],
     "spaces": lambda: [

@@ -178,18 +178,20 @@ class ImmersedResponse(ABC):
         """One Newton correction: y + d = target + tau (u0 + M (force + K d + R))."""
         condensation, c, base = self.immersed.condensation, self.components, self._carried(target)
         statement = condensation.reduced(Newton(force, stiffness, held, y, base, self.tau))
-        index = statement.index
-        known = np.zeros(statement.force.size)
-        known[index] = statement.value
-        push = statement.force + statement.times(known) if index.size else statement.force
-        right = (base - y)[:, :c].ravel() + self.tau * self.apply(push) - known
+        index, push, x = statement.index, statement.force, (base - y)[:, :c].ravel()
+        if index.size:
+            known = np.zeros(push.size)
+            known[index] = statement.value
+            push, x = push + statement.times(known), x - known
         # Reactions are sought whole, so that an error relative to x would be one of what they carry, not of the move.
         error = 0.0 if self.keeps or index.size else error
-        x = self.solve(statement, right, error)
-        d, reaction = x.copy(), np.zeros(force.shape)
-        d[index] = statement.value
-        reaction[index // c, index % c] = x[index]
-        move = statement.whole(d)
+        x = self.solve(statement, x + self.tau * self.apply(push), error)
+        reaction = np.zeros(force.shape)
+        if index.size:
+            reaction[index // c, index % c] = x[index]
+            x = x.copy()
+            x[index] = statement.value
+        move = statement.whole(x)
         felt = force + stiffness.times(move)
         reaction += condensation.react_rest(y + move, base, felt, held, self.tau)
         return Solution(move, felt + reaction, reaction, error)

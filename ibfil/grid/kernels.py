@@ -61,11 +61,10 @@ def _roma3(x: np.ndarray) -> np.ndarray:
 
 
 def _peskin4(x: np.ndarray) -> np.ndarray:
-    """Peskin 2002, Acta Numerica 11, 479, Eq. 6.27."""
-    r = np.abs(x)
-    near = 3 - 2 * r + np.sqrt(np.maximum(1 + 4 * r - 4 * r * r, 0))
-    far = 5 - 2 * r - np.sqrt(np.maximum(-7 + 12 * r - 4 * r * r, 0))
-    return 0.125 * np.where(r < 1, near, far)
+    """Peskin 2002, Acta Numerica 11, 479, Eq. 6.27; beyond one, of r, the branch is the other one at 2 - r."""
+    within = 1.0 - np.abs(x)
+    r = 1.0 - np.abs(within)
+    return 0.25 + np.copysign(0.125, within) * (1.0 - 2.0 * r + np.sqrt(1.0 + 4.0 * r * (1.0 - r)))
 
 
 def _bspline4(x: np.ndarray) -> np.ndarray:

@@ -75,16 +75,21 @@ class MomentLaw(Protocol):
 def gather(parts: Sequence[tuple[slice, Callable, np.ndarray]], configuration: tuple[int, ...]) -> Field:
     """A field over all nodes from one function of (s, t) a filament: (nodes, function, arclength) each.
 
-    A function that is the same for several filaments in a row should come as one part.
+    A function that is the same for several filaments in a row should come as one part. The values at a time are found
+    once: a step asks for them in every iteration.
     """
-    if len(parts) == 1:
-        _, only, s = parts[0]
-        return lambda t: only(s, t)
-    out = np.empty(configuration)
+    out, known = np.empty(configuration), np.nan
 
     def evaluate(t: float) -> np.ndarray:
-        for nodes, function, s in parts:
-            out[nodes] = function(s, t)
+        nonlocal known, out
+        if t == known:
+            return out
+        if len(parts) == 1:
+            out = parts[0][1](parts[0][2], t)
+        else:
+            for nodes, function, s in parts:
+                out[nodes] = function(s, t)
+        known = t
         return out
 
     return evaluate

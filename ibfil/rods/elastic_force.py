@@ -38,12 +38,10 @@ class Moment(NamedTuple):
     twist_slope: np.ndarray  # (n,) dM3/dO3
 
 
-@njit(cache=True)
-def release(nodes, bend, bend_slope):
+def release(nodes: np.ndarray, bend: np.ndarray, bend_slope: np.ndarray) -> None:
     """Zeroes M1, M2 (n, 2) and their slopes (n, 2, 2) at the ``nodes`` (k,), ends that carry no moment."""
-    for k in range(nodes.size):
-        bend[nodes[k]] = 0.0
-        bend_slope[nodes[k]] = 0.0
+    bend[nodes] = 0.0
+    bend_slope[nodes] = 0.0
 
 
 def nodal_force(mesh: Mesh, g: Configuration, moment: Moment, stretching: np.ndarray, force: np.ndarray) -> None:
