@@ -42,13 +42,18 @@ def threads() -> list[Row]:
     return [Row(**row) for row in bench_threads.measured()]
 
 
+def _inertia() -> list[Row]:
+    """Steps of Navier-Stokes flow in double and single precision, and what they take a cell."""
+    rows = [pieces.inertia(), pieces.inertia(precision="single", bar=None)]
+    return [*rows, *(pieces.a_cell(row) for row in rows)]
+
+
 PARTS: dict[str, Callable[[], list[Row]]] = {
     "pieces": lambda: [
         pieces.rft_step(),
         *pieces.evaluations(64, (1.15, 1 / 3.5)),
         *pieces.evaluations(128, (1.3, 1 / 5)),
-        pieces.inertia(),
-        pieces.inertia(precision="single", bar=None),
+        *_inertia(),
         pieces.table_pair("peskin4", 1.0),
         pieces.table_pair("bkp6", 4.5),
         pieces.table_of_a_swimmer(),

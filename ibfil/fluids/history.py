@@ -88,8 +88,9 @@ class History:
 
         Leaves the velocity, filtered, and its vorticity in ``flow`` (6, nx, ny, nz//2 + 1).
         """
-        reals = [field.view(self._real) for field in (block.modes, self._ahead, flow)]
-        _apply_forces(*reals, block.i, block.j, *self._waves, *self._filters, w.alpha, self._force_scale)
+        force, ahead = block.modes.view(self._real), self._ahead.view(self._real)
+        apart = tuple(field.view(self._real) for field in flow)  # they may lie apart (grid/fft.py)
+        _apply_forces(force, ahead, apart, block.i, block.j, *self._waves, *self._filters, w.alpha, self._force_scale)
 
     def commit(self, w: Weights) -> np.ndarray:
         """The step asked about last, all of it pushed, is the newest. Returns room for the modes of its omega x u."""
@@ -139,7 +140,7 @@ def _predict(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz,
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _apply_forces(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz, alpha, scale):
-    """Adds P force / (alpha + s) to ``ahead``; into ``flow`` that, filtered, and i k x of it."""
+    """Adds P force / (alpha + s) to ``ahead``; into the six of ``flow`` that, filtered, and i k x of it."""
     for i in range(i0, i0 + force.shape[1]):
         for j in range(j0, j0 + force.shape[2]):
             s, d, e = alpha + sx[i] + sy[j], kx[i] * kx[i] + ky[j] * ky[j], fx[i] * fy[j]
@@ -153,15 +154,15 @@ def _apply_forces(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz
                 ahead[2, i, j, k] += r * w
             for x in range(3):
                 for k in range(force.shape[3]):
-                    flow[x, i, j, k] = e * fz[k] * ahead[x, i, j, k]
+                    flow[x][i, j, k] = e * fz[k] * ahead[x, i, j, k]
             for k in range(0, force.shape[3], 2):
-                a, b, r = flow[0, i, j, k], flow[0, i, j, k + 1], kz[k]
-                u, v = flow[1, i, j, k], flow[1, i, j, k + 1]
-                w, g = flow[2, i, j, k], flow[2, i, j, k + 1]
-                flow[3, i, j, k], flow[3, i, j, k + 1] = r * v - q * g, q * w - r * u
-                flow[4, i, j, k], flow[4, i, j, k + 1] = p * g - r * b, r * a - p * w
-                flow[5, i, j, k], flow[5, i, j, k + 1] = q * b - p * v, p * u - q * a
+                a, b, r = flow[0][i, j, k], flow[0][i, j, k + 1], kz[k]
+                u, v = flow[1][i, j, k], flow[1][i, j, k + 1]
+                w, g = flow[2][i, j, k], flow[2][i, j, k + 1]
+                flow[3][i, j, k], flow[3][i, j, k + 1] = r * v - q * g, q * w - r * u
+                flow[4][i, j, k], flow[4][i, j, k + 1] = p * g - r * b, r * a - p * w
+                flow[5][i, j, k], flow[5][i, j, k + 1] = q * b - p * v, p * u - q * a
     if i0 == 0 and j0 == 0:
         for x in range(3):
             for k in range(2):
-                ahead[x, 0, 0, k] = flow[x, 0, 0, k] = 0.0
+                ahead[x, 0, 0, k] = flow[x][0, 0, k] = 0.0

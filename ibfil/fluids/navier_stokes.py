@@ -39,13 +39,16 @@ COURANT = 1.0  # cells that the fastest fluid may cross in a step
 class Workspace:
     """Where fields are transformed; what it holds does not outlive a call, so others may use ``flow`` too.
 
-    ``flow`` has FIELDS components. ``vectors`` of a node go through the grid: its force, and with two its torque.
+    ``flow`` has FIELDS components, which lie apart (``stagger``) where nothing else transforms in it. ``vectors`` of a
+    node go through the grid: its force, and with two its torque.
     """
 
-    def __init__(self, grid: Grid, vectors: int = 1, threads: int = 1, number: type = np.float64) -> None:
+    def __init__(
+        self, grid: Grid, vectors: int = 1, threads: int = 1, number: type = np.float64, stagger: bool = False
+    ) -> None:
         self.grid = grid
         nx, ny, nz = (int(n) for n in grid.cells)
-        self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS, number=number)
+        self.flow = VectorTransform((nx, ny, nz), threads, fields=FIELDS, number=number, stagger=stagger)
         self._slab = SlabFFT((nx, ny, nz), 3 * vectors, threads, number)
         self._couples_torque = vectors == 2
         (self._kx, self._ky, self._kz), _ = grid.wave_numbers()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import os
 import threading
 from collections.abc import Callable
@@ -115,12 +116,26 @@ def _measured(made: Callable[..., pyfftw.FFTW]) -> pyfftw.FFTW:
             return found if remember() else _estimated(made)
 
 
+def staggered(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    """Zeros of a ``shape`` (fields, ..), aligned, each field nine cache lines further into its page than the last.
+
+    Fields one after the other share few lines of the caches where the grid's extents are powers of two, and a loop over
+    six of them takes up to half as long again.
+    """
+    line = 64 // dtype.itemsize
+    size = math.prod(shape[1:])
+    pitch = -(-size // line) * line + 9 * line
+    room = pyfftw.zeros_aligned(shape[0] * pitch, dtype).reshape(shape[0], pitch)
+    return room[:, :size].reshape(shape)
+
+
 class VectorTransform:
     """Forward and backward transforms of ``real`` (3, nx, ny, nz) and ``modes`` (3, nx, ny, nz//2 + 1).
 
     ``forward`` keeps ``real``; ``backward`` overwrites both, and leaves the normalisation 1/(nx ny nz) to the caller.
     ``planning`` is ESTIMATED for a few transforms, MEASURED for many. There may be more
-    ``fields`` than 3. ``number`` is the type of ``real``, double or single precision.
+    ``fields`` than 3. ``number`` is the type of ``real``, double or single precision. ``stagger``: the modes of fields
+    lie apart (`staggered`), for loops over all of them.
     """
 
     def __init__(
@@ -130,10 +145,12 @@ class VectorTransform:
         planning: str = MEASURED,
         fields: int = 3,
         number: type = np.float64,
+        stagger: bool = False,
     ) -> None:
         nx, ny, nz = cells
         self.real = pyfftw.zeros_aligned((fields, nx, ny, nz), dtype=number)
-        self.modes = pyfftw.zeros_aligned((fields, nx, ny, nz // 2 + 1), dtype=modes_of(number))
+        room = staggered if stagger else pyfftw.zeros_aligned
+        self.modes = room((fields, nx, ny, nz // 2 + 1), modes_of(number))
         self.size = nx * ny * nz
 
         axes, threads = (0, 1, 2), useful_threads(self.size, threads)

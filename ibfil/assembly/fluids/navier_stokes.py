@@ -60,7 +60,8 @@ class NavierStokesModel(GridModel):
         from ...fluids.torque_coupling import TorqueStokesSolve
 
         threads = self.case.compute.threads
-        workspace = Workspace(self.grid, immersed.coupling.grid_vectors, threads, immersed.number)
+        alone = method == "table"
+        workspace = Workspace(self.grid, immersed.coupling.grid_vectors, threads, immersed.number, alone)
         shared = workspace.flow if immersed.number is np.float64 else None  # solvers by FFT are exact to round-off
         factor_cost = self.factor_cost(rods)
 
