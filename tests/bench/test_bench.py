@@ -19,7 +19,7 @@ from ibfil.errors import CaseError
         lambda: [pieces.rft_step(16)],
         lambda: pieces.evaluations(16, (1.1, 0.5)),
         lambda: [pieces.table_pair("roma3", 1.0, 5)],
-        lambda: [pieces.inertia(16)],
+        lambda: [pieces.inertia(16), pieces.a_cell(pieces.inertia(16), 16), pieces.swimmer_step()],
         lambda: pieces.swimmers(end=1e-3),
         lambda: linked.linked(2, (1e9, None), nodes=8),
         lambda: [*spaces.tables(), *spaces.steps(11), spaces.wall_pairs("roma3", 3.0, 5)],
