@@ -68,7 +68,7 @@ def inertia(cells: int = 64, precision: str = "double", bar: float | None = 1.1)
 
     Forces and coasting velocities go through slabs (grid/slab_fft.py), so that fewer are transformed in full: nine.
     The rest of the time goes to memory: a step reads five fields of the past and of forces and writes as many
-    (fluids/history.py). What was tried against that: fluids/README.md.
+    (fluids/history.py). fluids/README.md has the parts of it, and all that was tried.
     """
     text = case_text(41, "navier-stokes", "auto", "implicit", 1e-2)
     changes = ["fluid.density=10", f"fluid.cells=[{cells}, {cells}, {cells}]", f"fluid.precision={precision}"]

@@ -133,11 +133,8 @@ class Reduced(Protocol):
 
     index: np.ndarray
     value: np.ndarray
+    free: np.ndarray
     force: np.ndarray
-
-    @property
-    def free(self) -> np.ndarray:
-        """Zero at held unknowns, one elsewhere (c n,)."""
 
     def times(self, d: np.ndarray) -> np.ndarray:
         """The forces (c n,) that moves d (c n,) give."""
@@ -176,11 +173,9 @@ class _Whole:
     def __init__(self, newton: Newton) -> None:
         self._stiffness, self._shape = newton.stiffness, newton.force.shape
         self.index, self.value = newton.held.at, newton.held.value - newton.y.ravel()[newton.held.at]
+        self.free = np.ones(newton.force.size)
+        self.free[self.index] = 0.0
         self.force = newton.force.ravel()
-
-    @property
-    def free(self) -> np.ndarray:
-        return _free(self.force.size, self.index)
 
     def times(self, d: np.ndarray) -> np.ndarray:
         return self._stiffness.times(d.reshape(self._shape)).ravel()
@@ -190,13 +185,6 @@ class _Whole:
 
     def whole(self, d: np.ndarray) -> np.ndarray:
         return d.reshape(self._shape)
-
-
-def _free(size: int, index: np.ndarray) -> np.ndarray:
-    """Ones (size,), zero at ``index``."""
-    out = np.ones(size)
-    out[index] = 0.0
-    return out
 
 
 class NothingCondensed:
@@ -234,6 +222,8 @@ class _Condensed:
         turn = part == 3
         moves = held.value - y.ravel()[held.at]
         self.index, self.value = (3 * node + part)[~turn], moves[~turn]
+        self.free = np.ones(3 * n)
+        self.free[self.index] = 0.0
         still = np.ones(n)
         still[node[turn]] = 0.0
         self._turns = Turns(drag / tau, still)
@@ -242,10 +232,6 @@ class _Condensed:
         right[node[turn]] = moves[turn]
         self._rest = self._solve_turns(right)
         self.force = np.ascontiguousarray(force[:, :3]).ravel() + self._pushed(self._rest)
-
-    @property
-    def free(self) -> np.ndarray:
-        return _free(self.force.size, self.index)
 
     def _pushed(self, turns: np.ndarray) -> np.ndarray:
         """K_rp turns (3 n,)."""
