@@ -14,6 +14,7 @@ from ..case.expressions import COPIED
 from ..case.idle import idle_keys
 from ..case.table import expressions
 from ..observables.factory import observers
+from ..simulation import timescales
 from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
 from ..simulation.steps import AUTOMATIC_ERROR, POINTS_A_PERIOD
@@ -228,7 +229,7 @@ def _steps(simulation: Simulation) -> list[str]:
         *UNWATCHED[: bool(case.bodies)],
         *simulation.model.fluid_model.step_lines(),
         *_driven(simulation),
-        f"slowest bending time: {simulation.bending_time():.4g}",
+        f"slowest bending time: {timescales.slowest_bending(simulation.model):.4g}",
         *ringing(simulation),
     ]
 
