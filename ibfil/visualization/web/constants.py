@@ -26,8 +26,11 @@ Columns = Mapping[str, Mapping[str, Any]]
 
 
 def filled(page: str, title: str, data: str, *scripts: str) -> str:
-    """The page with its title, its data (JSON, of which no character can end the script), its scripts in turn."""
-    here = files(__package__)
+    """The page with its title, its data (JSON, of which no character can end the script), its scripts in turn.
+
+    Files are named from the folder of visualization on.
+    """
+    here = files(__package__.rpartition(".")[0])
     text = (here / page).read_text(encoding="utf-8")
     for char in "<>&\u2028\u2029":
         data = data.replace(char, f"\\u{ord(char):04x}")

@@ -1,7 +1,7 @@
 "use strict";
 // Rods that turn: tubes as shaded strips in the order of their depth, on a plain canvas, so that no graphics card is needed.
 // The script after this one has `run` and `radius`, the constants of the scene, and says what is shown now: position(node),
-// strokeEnd(stroke, end), share(node) of the colours, 0 to 255; what stands behind, backdrop(); the end of a picture, drawn().
+// strokeEnd(stroke, end), share(node) of the colours, 0 to 255; what stands behind, backdrop(); the end of a picture, drawn(); whether there is anything yet, ready().
 const part = (id) => document.getElementById(id);
 const canvas = part("canvas"), pen = canvas.getContext("2d");
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -35,6 +35,7 @@ function project(p) {
 }
 
 function draw() {
+  if (!ready()) return;
   const ratio = window.devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight;
   if (canvas.width !== Math.round(wide * ratio) || canvas.height !== Math.round(high * ratio)) {
     canvas.width = Math.round(wide * ratio);

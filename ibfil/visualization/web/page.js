@@ -13,6 +13,8 @@ const position = (node) => place(places, 3 * (state.output * nodes + node));
 const strokeEnd = (stroke, end) => place(linked, 6 * (state.output * run.links + stroke) + 3 * end);
 const share = (node) => colours[state.quantity][state.output * nodes + node];
 
+const ready = () => true;
+
 function backdrop() { if (sheets && part("flow").checked) flow(); }
 
 function drawn() {

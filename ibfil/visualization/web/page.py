@@ -56,7 +56,7 @@ def write_page(
         flow = _flow(opened)
         picked = _picked(opened, len(shown), flow, most, path)
         content = json.dumps(_content(opened, picked, shown, flow), allow_nan=False)
-        text = filled("page.html", opened.case.title or opened.path.stem, content, "draw.js", "page.js")
+        text = filled("web/page.html", opened.case.title or opened.path.stem, content, "web/draw.js", "web/page.js")
         count = len(opened)
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
