@@ -24,7 +24,7 @@ class Control(NamedTuple):
     """A key of a case that a page can change.
 
     ``kind`` is number, whole, formula, word or switch; ``value`` stands there now; ``words`` are those that may.
-    ``help`` says what the key means and what it may be. ``group`` is the table it stands in.
+    ``help`` has the meaning of the key and the values it may have. ``group`` is the table it stands in.
     """
 
     path: str
@@ -95,7 +95,7 @@ def _kind(hint: Any, metadata: tuple[Any, ...] = ()) -> Kind | None:
 
 
 def _help(entry: Entry, path: tuple[str | int, ...]) -> str:
-    """What the key means, and what may stand there."""
+    """The meaning of the key, and the values that may stand there."""
     key = next((part for part in reversed(path) if isinstance(part, str)), "")
     table = entry.table or (outer.table if (outer := entry_of(path[:-1])) else None)
     known = keys(table) if table else {}
