@@ -7,7 +7,6 @@ import time as clock
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ...case.reading import read_case
 from ...errors import CaseError, RunFailed, Stopped
 from .played import Played
 
@@ -87,8 +86,7 @@ class Session:
         """Begin again with another case. One that is at fault is told, and the run goes on as it was."""
         self._say(building=True)
         try:
-            changed = read_case(case, overrides)
-            self._began(Played(changed, self._colour))
+            self._began(Played(case.with_(overrides) if overrides else case, self._colour))
         except CaseError as error:
             self._say(faults=[fault.removeprefix(f"{case.file}: ") for fault in error.faults])
         except (RunFailed, MemoryError) as error:
