@@ -87,7 +87,7 @@ class Played:
         return told
 
     def scene(self) -> dict[str, Any]:
-        """All that stays while it runs (web/constants.py), and the case's controls."""
+        """All that stays while it runs (visualization/web/constants.py), and the case's controls."""
         snapshot = self.simulation.snapshot()
         places = [filament.position[None] for filament in snapshot.filaments.values()]
         bodies = ends_of_axes(self.case, _columns(snapshot.bodies, ("position", "e1", "e2", "e3")))
