@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from .meshes import PLAIN, View, add_array, box_of, known_box
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataSet
 
+    from ..case.schema import Case
     from ..io.reader import RunFile
     from ..io.snapshots import BodySnapshot, Snapshot
 
@@ -20,9 +22,14 @@ BEYOND = 1.35  # of a semi-axis: how far its line goes
 
 def extents(run: RunFile) -> list[np.ndarray]:
     """The ends of the axes (T, 6, 3) of each body of a run that has a size: what a picture has to have in it."""
+    return ends_of_axes(run.case, run.bodies)
+
+
+def ends_of_axes(case: Case, bodies: Mapping[str, Mapping[str, Any]]) -> list[np.ndarray]:
+    """The same of ``bodies`` as columns (T, 3) of position, e1, e2, e3 by name."""
     out = []
-    for name, columns in run.bodies.items():
-        size = run.case.bodies[name].shape.semi_axes
+    for name, columns in bodies.items():
+        size = case.bodies[name].shape.semi_axes
         if any(size):
             centre = np.asarray(columns["position"])
             arms = [a * np.asarray(columns[key]) for a, key in zip(size, ("e1", "e2", "e3"), strict=True)]

@@ -14,6 +14,8 @@ from .periodic_images import Pieces, unwrapped, wrapped
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkDataSet
 
+    from ..case.filament import Filament
+    from ..case.schema import Case
     from ..io.reader import RunFile
     from ..io.snapshots import FilamentSnapshot, Snapshot
 
@@ -46,20 +48,20 @@ class Rod(NamedTuple):
 
 
 def rods_of(run: RunFile) -> dict[str, Rod]:
-    """All filaments of a run by name.
+    """All filaments of a run by name."""
+    return {name: rod_of(run.case, run.filament(name), run.arclength(name)) for name in run.filaments}
+
+
+def rod_of(case: Case, filament: Filament, s: np.ndarray) -> Rod:
+    """A filament with nodes at the arclengths ``s`` (N,).
 
     The tube is the material radius where the case gives one; else the hydrodynamic radius that the grid gives a line;
     else, under rft, a hundredth of the length.
     """
-    return {name: Rod(run.arclength(name), _radius(run, name)) for name in run.filaments}
-
-
-def _radius(run: RunFile, name: str) -> np.ndarray:
-    s, filament = run.arclength(name), run.filament(name)
     if filament.radius is not None:
-        return np.broadcast_to(np.asarray(filament.radius.bind("s")(s), float), s.shape)
-    radius = fluid_model(run.case).line_radius
-    return np.full(s.shape, 0.01 * filament.length if radius is None else radius)
+        return Rod(s, np.broadcast_to(np.asarray(filament.radius.bind("s")(s), float), s.shape))
+    radius = fluid_model(case).line_radius
+    return Rod(s, np.full(s.shape, 0.01 * filament.length if radius is None else radius))
 
 
 def filament_data(run: RunFile, output: int, view: View = PLAIN) -> vtkDataSet:

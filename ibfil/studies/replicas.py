@@ -45,9 +45,8 @@ def means(runs: Sequence[tuple[Case, Mapping[str, Any], Mapping[str, float]]]) -
 
 
 def _but_for_the_seed(case: Case) -> str:
-    assert case.thermal is not None
-    same = case.model_copy(update={"thermal": case.thermal.model_copy(update={"seed": 0})})
-    return repr(same.model_dump(exclude=_OF_THE_SEED))
+    same = case.with_({"thermal.seed": 0})
+    return repr([(key, value) for key, value in same if key not in _OF_THE_SEED])
 
 
 def _mean(runs: Sequence[tuple[Case, Mapping[str, Any], Mapping[str, float]]]) -> Mean:

@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from helpers.made_run import BENT
 
+from ibfil.case.reading import parse_case
 from ibfil.commands import main
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
 from ibfil.studies import sweep_figure
 from ibfil.studies.member import Member, Outcome
+from ibfil.studies.replicas import means
 from ibfil.studies.settings import Setting, axis, axis_of, combinations
 from ibfil.studies.sweep import Swept, sweep
 from ibfil.studies.tables import write_csv, write_json
@@ -257,3 +259,36 @@ def test_faults_of_tables_of_points_are_one_line(tmp_path, content, told):
     with pytest.raises(CaseError) as caught:
         axis(f"@{table}")
     assert told in caught.value.faults[0]
+
+
+def test_runs_of_several_seeds_are_summed_up():
+    """Three of one scene, one of another temperature; a seed by its key, or by a parameter."""
+    key = BENT + "[thermal]\nenergy = 0.01\n"
+    named = BENT + "[parameters]\nmine = 1\n" + '[thermal]\nenergy = 0.01\nseed = "mine"\n'
+    for text, path in ((key, "thermal.seed"), (named, "parameters.mine")):
+        case = parse_case(text, "hot.toml")
+        runs = [
+            (case.with_({path: k}), {path: k, "x": 7}, {"far": value}) for k, value in ((1, 1.0), (2, 2.0), (3, 4.0))
+        ]
+        runs.append((case.with_({path: 1, "thermal.energy": 0.02}), {path: 1, "x": 8}, {"far": 100.0}))
+        (mean,) = means(runs)
+        assert mean.values == {"x": 7}
+        error = np.std([1.0, 2.0, 4.0], ddof=1) / np.sqrt(3)
+        assert mean.row() == {"x": 7, "seeds": 3, "far": pytest.approx(7 / 3), "far +-": pytest.approx(error)}
+
+
+def test_a_sweep_over_seeds_ends_with_their_means(tmp_path):
+    (tmp_path / "hot.toml").write_text(BENT + '[thermal]\nenergy = 0.01\n[observe.far]\nkind = "end_to_end"\n')
+    words = [
+        "sweep",
+        str(tmp_path / "hot.toml"),
+        "time.end=0.005",
+        "--vary",
+        "thermal.seed=1,2",
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    assert main.main(words) == 0
+    rows = list(csv.DictReader((tmp_path / "out" / "sweep_means.csv").open()))
+    assert rows[0]["seeds"] == "2"
+    assert float(rows[0]["far +-"]) > 0

@@ -20,7 +20,8 @@ from ibfil.visualization.pictures import Pictures, Wish
 from ibfil.visualization.run_figure import figure
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
-from ibfil.visualization.web.page import RING, _strokes, write_page
+from ibfil.visualization.web.constants import RING
+from ibfil.visualization.web.page import _strokes, write_page
 
 SIZE = np.array([0.2, 0.15, 0.1])
 
