@@ -11,6 +11,7 @@ prescribed, so ``W1`` is zero there, ``c1 = T``, and ``r''`` is the cubic throug
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -66,6 +67,14 @@ class Segmented(NamedTuple):
 
 def _stencils(s: np.ndarray, derivative: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """First node, weights of r' and of r'' for one free filament: 7 points, or 3 (4 for r'' at the ends)."""
+    first, w1, w2 = _known_stencils(s.tobytes(), derivative)
+    return first.copy(), w1.copy(), w2.copy()
+
+
+@lru_cache(maxsize=64)
+def _known_stencils(places: bytes, derivative: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same, found once for filaments whose nodes are at the same places (n doubles)."""
+    s = np.frombuffer(places)
     n, p = len(s), (7 if derivative == 6 else 4)
     first, w1, w2 = np.zeros(n, np.int64), np.zeros((n, p)), np.zeros((n, p))
     for i in range(n):

@@ -119,8 +119,9 @@ def _run(case: Case, path: Path) -> tuple[str, str]:
     with contextlib.suppress(CaseError):  # no checkpoint, or one that cannot be read
         last = read(checkpoint_path(path))
         begun = path.exists() and not _differing(parse_case(last.case, last.file), case)
-    result = run(case, path, overwrite=True, resume=begun, progress=False, log=stop_if_cut)
-    checkpoint_path(path).unlink(missing_ok=True)  # many small files, for runs that are of one length
+    # No checkpoint stays: many small files, for runs that are of one length.
+    result = run(case, path, overwrite=True, resume=begun, progress=False, log=stop_if_cut, extends=False)
+    checkpoint_path(path).unlink(missing_ok=True)
     return result.status, result.reason
 
 
@@ -163,12 +164,12 @@ def _standing(member: Member, folder: Path, log: Log) -> Outcome:
     from ..io.reader import RunFile
 
     path = folder / f"{member.name}.h5"
+    if not path.exists():
+        return Outcome(member, "waiting", path)  # its case is read where it is run: hundreds take seconds
     try:
         case = member.resolved()
     except CaseError as error:
         return Outcome(member, "failed", path, "; ".join(error.faults))
-    if not path.exists():
-        return Outcome(member, "waiting", path)
     try:
         with RunFile(path) as run:
             status, reason, written_by = run.status, run.reason, run.versions
