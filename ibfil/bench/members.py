@@ -1,9 +1,9 @@
 """The part of `ibfil bench` about the members of a study: what they cost beside their steps.
 
-Two workers sweep the swimmer of README, ten periods each and no fields of the grid, by the command itself. Counted is
-processor time of all processes, so that a busy machine changes little; steps are timed in each run (io/pace.py). What
-it takes to begin (the command, two workers, what they load) is found by a sweep of runs that end at once, and is
-shared by as many members as the issue of it names.
+Two workers sweep the swimmer of README, ten periods each, an output each period and no fields of the grid, by the
+command itself. Counted is processor time of all processes, so that a busy machine changes little; steps are timed in
+each run (io/pace.py). What it takes to begin (the command, two workers, what they load) is found by a sweep of runs
+that end at once, and is shared by as many members as there are in a large study.
 """
 
 from __future__ import annotations
@@ -64,10 +64,12 @@ def members(count: int = MEMBERS, periods: int = PERIODS) -> list[Row]:
         whole = swept(count, periods, Path(place) / "whole")
     each, stepping = (whole.processor - begin.processor) / count, whole.stepping / count
     of_all = each + begin.processor / LARGE
-    name = f"a member of {LARGE}, {whole.steps // count} steps, {JOBS} workers"
+    own, clock = f"a member of {LARGE}, {whole.steps // count} steps, {JOBS} workers", JOBS * whole.seconds / count
+    busy = whole.processor / count
     return [
-        Row(f"{name}: processor", of_all, "its steps", stepping, of_all / stepping, 1.05),
-        Row(f"a member of {count}: clock x workers", JOBS * whole.seconds / count, "processor", whole.processor / count,
-            JOBS * whole.seconds / whole.processor, None),
-        Row("the command and its workers, to begin", begin.processor, "a member's steps", stepping, begin.processor / stepping, None),
+        Row(f"{own}: processor", of_all, "its steps", stepping, of_all / stepping, 1.05),
+        Row(f"one of {count}: clock x workers", clock, "processor", busy, clock / busy, None),
+        Row(
+            "command and workers, to begin", begin.processor, "steps of one", stepping, begin.processor / stepping, None
+        ),
     ]

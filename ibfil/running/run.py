@@ -59,8 +59,8 @@ def run(
     ``observables`` are further ones, made
     in Python, and ``laws`` constitutive laws by filament (rods/constitutive.py). ``build`` makes the simulation from
     the case and FFTW wisdom, by default `Simulation` with
-    these laws, and ``look`` says what is told of it before it runs. Without ``extends`` the run is not to be made longer
-    one day: a checkpoint is written only where it is cut, or takes longer than `output.checkpoint_every`.
+    these laws, and ``look`` says what is told of it before it runs. Without ``extends`` the run is not to be made
+    longer one day: a checkpoint is written only where it is cut, or takes longer than `output.checkpoint_every`.
 
     Raises CaseError (also where ``output`` exists and ``overwrite`` is not set), RunFailed, and Interrupted
     after Ctrl-C or SIGTERM; a second one kills.
