@@ -2,7 +2,7 @@
 
 Two workers sweep the swimmer of README, ten periods each, an output each period and no fields of the grid, by the
 command itself. Counted is processor time of all processes, so that a busy machine changes little; steps are timed in
-each run (io/pace.py). What it takes to begin (the command, two workers, what they load) is found by a sweep of runs
+each run (io/pace.py). The cost to begin (the command, two workers, what they load) is found by a sweep of runs
 that end at once, and is shared by as many members as there are in a large study.
 """
 
@@ -57,7 +57,7 @@ def swept(members: int, periods: float, folder: Path) -> Swept:
 
 
 def members(count: int = MEMBERS, periods: int = PERIODS) -> list[Row]:
-    """What a member takes of the processors over what its steps do; and, on a machine of their own, of the clock."""
+    """Processor time of a member over that of its steps; and, on a machine of their own, its time by the clock."""
     with tempfile.TemporaryDirectory() as place:
         swept(FEW, 0.05, Path(place) / "warm")  # compiles, and keeps the table
         begin = swept(FEW, 0.05, Path(place) / "begin")

@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from ..linalg.banded import Profile
 from ..linalg.finite_differences import clamped_weights, ghost_weights, weights
@@ -161,6 +162,14 @@ def _spread(low: np.ndarray, high: np.ndarray, joined: np.ndarray, times: int) -
     return low, high
 
 
+@njit(cache=True)
+def _filled(first, last):
+    """Has each row reach as far as those above it do that it takes part in: what elimination fills."""
+    for i in range(len(first)):
+        for k in range(first[i], i):
+            last[i] = max(last[i], last[k])
+
+
 def profile(mesh: Mesh, neighbours: int = 1) -> Profile:
     """Which displacements a node's force feels: its stencils and those of ``neighbours`` each side; fill included."""
     n, p = mesh.w1.shape
@@ -172,6 +181,5 @@ def profile(mesh: Mesh, neighbours: int = 1) -> Profile:
     low = np.minimum(np.where(used, columns, n).min(axis=1), rows)
     high = np.maximum(np.where(used, columns, -1).max(axis=1), rows)
     first, last = _spread(low, high, joined, neighbours)
-    for i in range(n):
-        last[i] = max(last[i], last[first[i] : i + 1].max())
+    _filled(first, last)
     return Profile(first, last, max(width, int(np.max(last - rows))))

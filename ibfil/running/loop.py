@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from ..errors import Interrupted, RunFailed, Stopped
 from ..io import checkpoint
@@ -124,7 +121,7 @@ class Loop:
         for due in dues:
             longer = due is dues[-1] and self._extends and not lasts(self.case, simulation.grid is not None)
             if longer and self._recorder is not None:
-                self._longer = _copied(self._present(self._recorder))
+                self._longer = self._present(self._recorder).copied()
             if due.time > simulation.time + slack:
                 try:
                     simulation.advance(due.time, self._after_step)
@@ -297,8 +294,3 @@ class Loop:
         except Exception:  # what went wrong first is what counts
             self._recorder.close()
             record_end(self._path, "failed", reason)
-
-
-def _copied(one: checkpoint.Checkpoint) -> checkpoint.Checkpoint:
-    """The same, in memory of its own: it stays as it is while the simulation goes on."""
-    return replace(one, state={k: np.copy(v) if isinstance(v, np.ndarray) else v for k, v in one.state.items()})
