@@ -71,6 +71,8 @@ class RodStack:
     def variation(self, table: str, expression: Expression) -> dict[str, np.ndarray]:
         """The values (k,) of i and phase over the copies of a filament, of those that a formula of it uses."""
         mine = [f for name, f in zip(self.tables, self.filaments, strict=True) if name == table]
+        if all(f is mine[0] for f in mine):  # copies that are alike
+            mine = mine[:1]
         found = [dict(f.origin[1]) for it in mine for _, f in expressions(it) if f.origin and f.origin[0] == expression]
         return {name: np.array([one[name] for one in found]) for name in (found[0] if found else ())}
 

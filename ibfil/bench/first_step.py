@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from .timing import Row
+from .timing import Row, of_children
 
 COLD, WARM = 10.0, 1.2  # seconds
 _COMMAND = ("-m", "ibfil", "run", "swimmer_stokes", "time.end=0.005", "-o", "first.h5", "--force")  # one step
@@ -34,12 +33,6 @@ def _seconds(words: tuple[str, ...], folder: str) -> float:
     """Processor time of a process that has its caches in a folder and nowhere else: that of an idle machine's clock."""
     cache = str(Path(folder) / "cache")
     caches = {"NUMBA_CACHE_DIR": cache, "XDG_CACHE_HOME": cache}
-    began = _children()
+    began = of_children()
     subprocess.run([sys.executable, *words], cwd=folder, env=os.environ | caches, capture_output=True, check=True)
-    return _children() - began
-
-
-def _children() -> float:
-    """Processor time of all processes that were started and have ended."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    return of_children() - began

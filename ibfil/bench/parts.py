@@ -10,6 +10,7 @@ from ..errors import CaseError
 from . import first_step as bench_first_step
 from . import linked as bench_linked
 from . import many as bench_many
+from . import members as bench_members
 from . import pieces
 from . import spaces as bench_spaces
 from . import swimming as bench_swimming
@@ -69,6 +70,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "body": lambda: bench_swimming.heads(),
     "threads": threads,
     "many": lambda: many(),
+    "members": lambda: bench_members.members(),
 }
 USUAL = ("pieces", "swimmer")
 
@@ -76,7 +78,8 @@ USUAL = ("pieces", "swimmer")
 def main(json: bool = False, parts: Sequence[str] = ()) -> int:
     """Measures the parts asked for and prints a table, or JSON. Returns 0: a busy machine is no failure.
 
-    The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB.
+    The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB,
+    "members" some three minutes.
     Raises CaseError for a part there is not.
     """
     for part in set(parts) - set(PARTS):
