@@ -1,8 +1,8 @@
 """The nodes of a scene on a grid whose planes are shared: each process has those whose kernels touch its planes.
 
-A node near the border of two processes is with both, and each spreads to, and looks at, its own planes only. What a node
-feels comes back plane by plane, (n, P, v), each plane from the one process that has it, and is summed over the planes on
-process 0: so its last bits do not depend on where the borders are.
+A node near the border of two processes is with both, and each spreads to, and looks at, its own planes only. The
+value at a node comes back plane by plane, (n, P, v), each plane from the one process that has it, and is summed over
+the planes on process 0: so its last bits do not depend on where the borders are.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ class SharedNodes:
     def _dealt(self, values: np.ndarray | None, shape: tuple[int, ...], number: type) -> np.ndarray:
         """The part of this process of ``values`` (n, *shape) that process 0 has."""
         comm, each = self._comm, int(np.prod(shape))
-        out = np.empty((int(self._counts[comm.rank]), *shape), number)
-        sent = None if values is None else np.ascontiguousarray(values[self._order], number)
+        out: np.ndarray = np.empty((int(self._counts[comm.rank]), *shape), number)
+        sent: np.ndarray | None = None if values is None else np.ascontiguousarray(values[self._order], number)
         comm.Scatterv([sent, self._counts * each] if sent is not None else None, out)
         return out
 
@@ -104,7 +104,7 @@ def _spread(base, weights, force, field, first, nx):
 
 @njit(cache=True)
 def _interpolate(base, weights, field, first, nx, out):
-    """Into out (n, P, 3) what each of those planes gives a node."""
+    """Adds to out (n, P, 3) the share of each of those planes in a node's value."""
     n, _, p = weights.shape
     planes, ny, nz = field.shape[1:]
     for q in range(n):

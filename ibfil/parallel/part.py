@@ -15,7 +15,7 @@ from .transform import SharedTransform
 
 
 class GridPart:
-    """What a process has of a grid of ``box`` (3,) and ``cells`` (3,), and does in each of its solves.
+    """The part of one process in a grid of ``box`` (3,) and ``cells`` (3,), and in each of its solves.
 
     ``vectors`` of a node go through the grid: its force, and with two its torque. All processes call a method
     together; what it takes of nodes process 0 has, and gets.
@@ -50,7 +50,7 @@ class GridPart:
         half_curl(source, kx, ky[block.j : block.j + 1], kz, target)
 
     def velocity(self, viscosity: float, alpha: float, vectors: np.ndarray | None) -> np.ndarray:
-        """What ``vectors`` (n, 3 v) on the nodes drive at them: velocities, and half the vorticities where v = 2."""
+        """Velocities at nodes that ``vectors`` (n, 3 v) on them drive, and half the vorticities where v = 2."""
         t, fields = self.transform, 3 * self.vectors
         self.nodes.spread(vectors, fields, t.real)
         for block in t.blocks(fields):

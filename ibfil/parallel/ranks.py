@@ -1,6 +1,6 @@
 """The processes of a run: process 0 runs the case, the others do their parts of what it asks for.
 
-What is shared is a part: a class whose methods all processes call together, each with its own share of the data.
+Shared are parts: each a class whose methods all processes call together, each with its own share of the data.
 Process 0 alone knows rods, files, clocks and signals, so nothing has to be agreed upon: the others wait, take up a call
 with its small arguments, and wait again. An error on one of them ends all, by MPI_Abort, as the rest could wait for it
 for ever; one on process 0 amid a call does too, once its files are closed.
@@ -50,7 +50,7 @@ class Shared:
         weakref.finalize(self, ranks.forget, key)
 
     def call(self, method: str, *told: Any, own: tuple[Any, ...] = ()) -> Any:
-        """What the method gives on process 0, of the arguments ``told`` to all, and its ``own``, None on the others."""
+        """The value of the method on process 0, of arguments ``told`` to all, and its ``own``, None on the others."""
         return self._ranks.call(self, method, told, own)
 
 
@@ -130,7 +130,7 @@ def _refuse(line: str) -> NoReturn:
 
 
 def serve(comm: Any) -> None:
-    """What processes other than 0 do: their parts of all that is asked for, until there is nothing more."""
+    """The work of a process other than 0: its part of all that is asked for, until there is nothing more."""
     for number in (signal.SIGINT, signal.SIGTERM):  # process 0 ends the run, and with it this
         signal.signal(number, signal.SIG_IGN)
     parts: dict[int, Any] = {}

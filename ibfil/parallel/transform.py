@@ -11,6 +11,7 @@ processes and component.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,9 @@ from .division import Division
 class SharedTransform:
     """This process's part of ``fields`` real fields on a grid of ``cells``, and of their modes; all call together.
 
-    ``real`` (fields, nx/P, ny, nz) are the planes, ``modes`` (fields, nx, ny/P, nz//2 + 1) the rows. Process 0 plans, and
-    the others take its plans; ``comm`` is the MPI communicator, ``number`` the type of ``real``.
+    ``fields`` is 3 or more, and 3 or all of them are transformed at a time.
+    ``real`` (fields, nx/P, ny, nz) are the planes, ``modes`` (fields, nx, ny/P, nz//2 + 1) the rows. Process 0 plans,
+    and the others take its plans; ``comm`` is the MPI communicator, ``number`` the type of ``real``.
     """
 
     def __init__(
@@ -38,10 +40,8 @@ class SharedTransform:
         self.real = pyfftw.zeros_aligned((fields, mine, ny, nz), dtype=number)
         self.modes = pyfftw.zeros_aligned((fields, nx, own, half), dtype=kind)
         self._sent = pyfftw.zeros_aligned(mine * ny * half, dtype=kind)
-        self._parts = [  # of what is sent, or comes back: my planes, the rows of each process
-            self._sent[mine * half * self.rows.starts[r] : mine * half * self.rows.starts[r + 1]].reshape(mine, -1, half)
-            for r in range(comm.size)
-        ]
+        ends = [mine * half * start for start in self.rows.starts]  # in it: my planes, the rows of each process
+        self._parts = [self._sent[a:b].reshape(mine, -1, half) for a, b in pairwise(ends)]
         self._in_planes = [mine * half * count for count in self.rows.counts]
         self._in_rows = [own * half * count for count in self.planes.counts]
 
@@ -60,7 +60,10 @@ class SharedTransform:
         self._forth = plan(self._plane, self._plane_modes, (0, 1), "FFTW_FORWARD", few)
         self._back = plan(self._plane_modes, self._plane, (0, 1), "FFTW_BACKWARD", few)
         few = useful_threads(self._room.size, threads)
-        self._along = [plan(self._room, self._room, (1,), d, few) for d in ("FFTW_FORWARD", "FFTW_BACKWARD")]
+        self._along = {
+            count: [plan(room, room, (1,), d, few) for d in ("FFTW_FORWARD", "FFTW_BACKWARD")]
+            for count, room in ((n, self._room[:n]) for n in {3, len(self._room)})
+        }
 
     def blocks(self, fields: int) -> Iterator[Block]:
         """All modes of this process of the first ``fields`` of ``real``, one row after the other; the room is reused.
@@ -69,7 +72,7 @@ class SharedTransform:
         """
         for field in range(fields):
             self._to_rows(field)
-        forward = self._along[0]
+        forward = self._along[fields][0]
         for j in range(self.modes.shape[2]):
             self._room[:fields, :, 0] = self.modes[:fields, :, j]
             forward.execute()
@@ -77,7 +80,7 @@ class SharedTransform:
 
     def from_blocks(self, fields: int, fill: Callable[[Block], None]) -> np.ndarray:
         """The first ``fields`` of ``real``, times the cells, of modes that ``fill`` puts into each row's block."""
-        backward = self._along[1]
+        backward = self._along[fields][1]
         for j in range(self.modes.shape[2]):
             fill(Block(self._room[:fields], 0, j))
             backward.execute()
