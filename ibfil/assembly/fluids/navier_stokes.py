@@ -147,10 +147,11 @@ class NavierStokesModel(GridModel):
     def remarks(self) -> list[str]:
         """A background flow that is put on the grid at each step."""
         if self.flow is None or flow_parts(self.case):
-            return []
+            return super().remarks()
         return [
+            *super().remarks(),
             "fluid.flow is no sum of at most 4 products f(t) g(x, y, z) that is seen: it is put on the grid each step, "
-            "which takes as long as the step itself or twice that"
+            "which takes as long as the step itself or twice that",
         ]
 
     def step_lines(self) -> list[str]:

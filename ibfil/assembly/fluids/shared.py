@@ -36,7 +36,7 @@ def among(model: type[FluidModel], case: Case) -> FluidModel:
         return model(case)
     found = next((kind for kind in (SharedStokes, SharedNavierStokes) if issubclass(kind, model)), None)
     if found is None:
-        raise _refused(case, f'fluid.model = "{case.fluid.kind}" has no grid that {ranks.size} processes could share')
+        raise _refused(case, f"fluid {case.fluid.words} has no periodic grid for {ranks.size} processes")
     if case.bodies:
         raise _refused(case, f"bodies: {ranks.size} processes share a grid, and with bodies none is at work")
     if case.thermal is not None:
