@@ -47,7 +47,7 @@ def surroundings(variables: dict[str, str]) -> dict[str, str]:
 @pytest.mark.parametrize("rank", [0, 1])
 def test_without_mpi4py_it_is_said_once_what_to_install(tmp_path, rank):
     (tmp_path / "mpi4py").mkdir()
-    (tmp_path / "mpi4py/__init__.py").write_text("raise ImportError('none')")
+    (tmp_path / "mpi4py" / "__init__.py").write_text("raise ImportError('none')")
     started = {**os.environ, "OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_RANK": str(rank)}
     words = [sys.executable, "-m", "ibfil", "run", "swimmer"]
     env = surroundings(started | {"PYTHONPATH": str(tmp_path)})
