@@ -22,11 +22,11 @@ PACKAGE = ROOT / "ibfil"
 # From the ground up: what stands later may import what stands before it, never the other way round.
 ORDER = (
     *("version", "errors", "cache", "screen", "threads"),
-    *("linalg", "grid", "rods", "bodies", "fluids", "timestepping"),
+    *("linalg", "grid", "rods", "bodies", "fluids", "parallel", "timestepping"),
     *("case", "io", "observables", "shapes", "assembly", "simulation", "check", "running"),
     *("analysis", "visualization", "bench", "studies", "commands"),
 )
-METHOD = ("linalg", "grid", "rods", "bodies", "fluids", "timestepping")
+METHOD = ("linalg", "grid", "rods", "bodies", "fluids", "parallel", "timestepping")
 FILES_A_FOLDER, LINES_A_FILE, LINES_A_FUNCTION = 20, 300, 50
 DRAWING = {"matplotlib", "pyvista", "vtk", "vtkmodules"}
 

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from .base import Scene
 
 
+SHARED = 2**21  # cells from which a grid is worth sharing between processes
+
+
 class GridModel(ImmersedModel):
     """A fluid on a periodic grid."""
 
@@ -144,6 +147,14 @@ class GridModel(ImmersedModel):
         if axis is not None:
             return [*out, *grid_warnings.of_flow(self.grid, self.flow, axis), *sheet.of_flow(self.flow, axis, self.box)]
         return [*out, *grid_warnings.of_flow(self.grid, self.flow)]
+
+    def remarks(self) -> list[str]:
+        """Of a large grid, that processes may share it."""
+        if np.prod(self.grid.cells) < SHARED or self.case.bodies or self.case.thermal is not None:
+            return []
+        how = "" if self.case.fluid.inertial else ' with fluid.method = "fft" or "krylov"'
+        rest = "rods, the mobility table and outputs stay with process 0, as does the file"
+        return [f"mpiexec -n P ibfil run shares the grid, its transforms and fields{how}; {rest}"]
 
     # -- pictures and recorded runs
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ class NavierStokesWithBodies(NavierStokes):
         immersed, n = self.immersed, self.immersed.shells.nodes
         alpha, operator = self._operator(self.density / tau)
         nodes, past = immersed.all_nodes(r, e3), weights(alpha, tau, w, self.history.dt_old)
-        felt = self.workspace.gather(nodes, partial(self.history.predict, past))
+        felt = self._coast(nodes, past)
         u0, c = immersed.coupling.from_grid(nodes.axes, felt), immersed.coupling.components
         flow, drift = immersed.advected(nodes[:n], r[:n], time), u0[n:, :3]
         rods = u0[:n]

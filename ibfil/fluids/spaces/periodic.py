@@ -94,10 +94,12 @@ _last: dict[str, np.ndarray] = {}  # the last octant, by its key
 def _at_hand(key: dict[str, object], make: Callable[[], np.ndarray]) -> np.ndarray:
     """The octant of the last run of this process, as runs of a study have the same, or that of the user's cache."""
     text = repr(key)
-    if text not in _last:
+    values = _last.get(text)
+    if values is None:
+        values = cache.table(key, make)
         _last.clear()
-        _last[text] = cache.table(key, make)
-    return _last[text]
+        _last[text] = values
+    return values
 
 
 @once
