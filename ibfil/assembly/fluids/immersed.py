@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import costs
+from .. import costs, swimmers
 from .. import grid as grids
 from ..drag import drag
 from . import grid_warnings, shells
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.resistive_force import Drag
+    from ...fluids.shells.swimmer import Swimmer
     from ...fluids.spaces.base import Space
+    from ...fluids.stokes import Solver
     from ...grid.kernels import Kernel
     from ...timestepping.brownian import Drift
     from ..stacked import RodStack
@@ -96,13 +98,20 @@ class ImmersedModel(FluidModel):
 
     lowest_marker = -np.inf  # the height below which markers of bodies may not come
 
-    def with_bodies(self, rods: RodStack) -> Fluid:
-        """The fluid about rods and bodies, by the exact table."""
+    def with_bodies(self, rods: RodStack, immersed: Immersed, method: str, solver: Solver | None) -> Fluid:
+        """Stokes flow about rods and bodies: by the exact table, or with a ``solver`` by FFT."""
+        from ...fluids.shells.fourier import StokesByFFTWithBodies, TransformedBodies
         from ...fluids.shells.stokes import ImmersedBodies, StokesWithBodies
 
-        immersed = self.immersed(rods)
         assert isinstance(immersed, ImmersedBodies)
-        return StokesWithBodies(immersed, self.lowest_marker)
+        if solver is None:
+            return StokesWithBodies(immersed, self.lowest_marker)
+        transformed = TransformedBodies.of(immersed, solver, self.swimmers(rods, method))
+        return StokesByFFTWithBodies(transformed, self.lowest_marker)
+
+    def swimmers(self, rods: RodStack, method: str) -> tuple[Swimmer, ...]:
+        """The swimmers that a method by FFT solves for by themselves: all as one where M is the preconditioner."""
+        return swimmers.apart(self.case, rods) if method == "krylov" else (swimmers.whole(self.case, rods),)
 
     def ingredients(self, rods: RodStack, fluid: Fluid) -> Immersed:
         """The ingredients of a fluid: with bodies those that it has, whose tables serve; else made anew."""
@@ -114,27 +123,42 @@ class ImmersedModel(FluidModel):
         assert isinstance(fluid, StokesWithBodies | NavierStokesWithBodies)
         return fluid.pushing
 
-    def markers(self) -> int:
-        """How many markers the bodies have."""
+    @cached_property
+    def markers(self) -> list[int]:
+        """How many markers each of the bodies has."""
         fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.bodies)
-        return sum(len(found.markers) for found in fits if found is not None)
+        return [0 if found is None else len(found.markers) for found in fits]
+
+    def reached(self, rods: RodStack) -> np.ndarray:
+        """Places (k, 3) at the start between which all that pushes is: nodes, and bodies to their largest semi-axes."""
+        r, sizes = [rods.start.r], [max(body.shape.semi_axes) for body in self.case.bodies.values()]
+        if rods.bodies:
+            centres = rods.start.r[rods.count : rods.count + 2 * len(sizes) : 2]
+            r += [centres + sign * np.array(sizes)[:, None] for sign in (-1.0, 1.0)]
+        return np.concatenate(r)
 
     def method(self, rods: RodStack) -> str:
         """The case's, or the cheapest by counts."""
-        if rods.bodies:
-            return "table"
         if self.case.fluid.method != "auto":
             return self.case.fluid.method
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
 
-    def by_table(self, rods: RodStack, pair: float = 1.0, inertia: float = 0.0) -> dict[str, float]:
-        """Seconds of a step with bodies, from counts: the table of nodes and markers, whose system is that of nodes.
+    def with_markers(
+        self, rods: RodStack, evaluations: Mapping[str, float], pair: float = 1.0, inertia: float = 0.0
+    ) -> dict[str, float]:
+        """Seconds of a step with bodies by each method, from counts; ``evaluations``: of velocities by transforms.
 
         ``pair`` is what a pair costs, over what it does in the periodic table, ``inertia`` what a fluid's own takes.
         """
+        counts = [self._points(swimmer) for swimmer in swimmers.apart(self.case, rods)]
+        found = costs.with_markers(self.case, counts, self.components, evaluations, pair)
         more = inertia if self.case.fluid.inertial else 0.0
-        return {"table": more + costs.with_markers(self.case, rods.count, self.markers(), self.components, pair)}
+        return {method: seconds + more for method, seconds in found.items()}
+
+    def _points(self, swimmer: Swimmer) -> tuple[int, int]:
+        """How many nodes and markers a swimmer has."""
+        return sum(rod.stop - rod.start for rod in swimmer.rods), sum(self.markers[b] for b in swimmer.bodies)
 
     def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""
@@ -196,11 +220,15 @@ class ImmersedModel(FluidModel):
 
     def memory(self, rods: RodStack) -> dict[str, float]:
         """The mobility table, and what solves with it."""
-        n, m, method = rods.count + self.markers(), rods.system.unknowns, self.method(rods)
+        n, m, method = rods.count + sum(self.markers), rods.system.unknowns, self.method(rods)
         out = {"mobility table": self._number * self.table_entries()}
+        if rods.bodies:
+            out["bodies by nodes"] = 5 * 8.0 * rods.count * m * (6 * len(rods.bodies) + len(rods.motors))
         if method == "krylov":
             band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
-            out["preconditioner"] = sum(8.0 * (self.components * k) ** 2 for k in rods.group_sizes) + 2 * band
+            alone = [sum(self._points(one)) for one in swimmers.apart(self.case, rods)] if rods.bodies else None
+            blocks = sum(8.0 * (self.components * k) ** 2 for k in alone or rods.group_sizes)
+            out["preconditioner"] = (4 if alone else 1) * blocks + 2 * band
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
             out["dense matrices"] = costs.dense_bytes(n, self.components)

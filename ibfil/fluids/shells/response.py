@@ -46,7 +46,7 @@ class Rigid:
 
         ``levers`` (3 k, p) and ``drift`` (3 k,), in a background flow, are of the markers.
         """
-        self.whole = matrix
+        self.whole, self.components = matrix, components
         at: slice | np.ndarray = slice(rods, None)
         if components > 3:  # markers do not spin
             at = np.arange(rods, len(matrix)).reshape(-1, components)[:, :3].ravel()
@@ -130,7 +130,7 @@ class WithShells:
     ) -> None:
         """``flow`` (n, c) or (n, m): the motions of nodes without any force."""
         self._rigid, self._shells, self._flow, self.tau = rigid, shells, flow, tau
-        self._c = len(rigid.rods) // shells.nodes
+        self._c = rigid.components
         self._mobility = rigid.rods if spin_drag is None else _with_turns(rigid.rods, spin_drag)
         self._factors: tuple[Stiffness, Factors] | None = None  # and the stiffness they are of
         self._each: _Each | None = None
@@ -170,11 +170,7 @@ class WithShells:
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements without stiffness: by that of none."""
-        n, m = self._shells.nodes, force.shape[1]
-        none = Stiffness(np.zeros((n, m, 3 * m)), no_pairs(m))
-        assert held.carried is not None
-        bare = held._replace(carried=frozen(held.carried))
-        return self.implicit(force, none, bare, np.zeros_like(force), target)
+        return self.implicit(*without_stiffness(force, held, self._shells.nodes), np.zeros_like(force), target)
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """Velocities of forces on rods and markers, c numbers of each (flat), without the background flow."""
@@ -251,6 +247,13 @@ class WithShells:
         rows = (self._shells.in_rows(q, y.shape) for q in (dq, rigid.forces(rate, felt), reacted))
         move, felt, reaction = (np.concatenate(both) for both in zip((d, force, support), rows, strict=True))
         return Solution(move, felt, reaction)
+
+
+def without_stiffness(force: np.ndarray, held: Prescribed, n: int) -> tuple[np.ndarray, Stiffness, Prescribed]:
+    """The force, a stiffness of zeros of n nodes, and what is held and carried where forces stay as they are."""
+    m = force.shape[1]
+    assert held.carried is not None
+    return force, Stiffness(np.zeros((n, m, 3 * m)), no_pairs(m)), held._replace(carried=frozen(held.carried))
 
 
 def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
