@@ -20,14 +20,15 @@ SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
 _PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
 _COMPONENTS = 2.5  # the same of a table with torques, of one without
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
+_LARGE_FLOP = 3.0e-11  # the same in products and triangular solves of large ones
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
 _ELEMENT = 1.0e-5  # an element of a link for its force and stiffness
 _ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
 _THERMAL = 1.8  # of a semi-implicit step of the rods, one with thermal forces: a second force, a second solve
 _NORMAL = 1.6e-8  # a normal number
 _PRODUCTS = 11  # of GMRES with a preconditioner rod by rod, an iteration of Newton
-_GIVEN = 6  # products that find what swimmers give each other, an iteration of Newton
-_SWIMMER = 3e-4  # a swimmer's own answer to what comes to it
+_GIVEN = 12  # products that find what swimmers give each other, an iteration of Newton
+_SWIMMER = 8e-4  # a swimmer's own answer to what comes to it
 _LARGEST = 2.0**30  # bytes that the table's dense matrices may take before the table is out of the question
 
 
@@ -126,7 +127,8 @@ def with_markers(
     """
 
     def made(nodes: int, markers: int) -> float:
-        shell = _root(markers, 3) + 6.0 * markers * 3 * (parts * nodes) ** 2 * _FLOP
+        m, n = 3.0 * markers, float(parts) * nodes
+        shell = (0.35 * m**3 + m**2 * n + 2 * m * n**2) * _LARGE_FLOP
         return pair * _table(nodes + markers, parts) + shell + rounds * solved(nodes, parts)
 
     nodes, markers = (sum(numbers) for numbers in zip(*counts, strict=True))

@@ -22,6 +22,7 @@ from .rotation import turning
 from .rows import Rows
 from .supports import Supports
 
+
 class Joined(NamedTuple):
     """Rods and bodies, the ends in bodies, and the nodes of each body's rods and of the rod that each motor turns."""
 

@@ -9,20 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import costs, swimmers
+from .. import costs
 from .. import grid as grids
 from ..drag import drag
 from . import grid_warnings, shells
-from .base import FluidModel, Term
+from .base import Term
+from .immersed_bodies import ImmersedBodiesModel
 
 if TYPE_CHECKING:
     from ...case.filament import Filament
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.resistive_force import Drag
-    from ...fluids.shells.swimmer import Swimmer
-    from ...fluids.spaces.base import Space
-    from ...fluids.stokes import Solver
     from ...grid.kernels import Kernel
     from ...timestepping.brownian import Drift
     from ..stacked import RodStack
@@ -33,23 +31,13 @@ BAND = "band matrix"
 MOST_NODES = 400  # of a rod whose drag on turning is solved for: a dense system of three times as many
 
 
-class ImmersedModel(FluidModel):
+class ImmersedModel(ImmersedBodiesModel):
     """A fluid that nodes push through a discrete delta kernel."""
 
     @cached_property
     def kernel(self) -> Kernel:
         """The discrete delta kernel."""
         return grids.kernel(self.case)
-
-    @property
-    def components(self) -> int:
-        """How many numbers of a node go through the fluid: 3, or 4 with its twist torque."""
-        return 4 if self.case.couples_torque else 3
-
-    @property
-    @abstractmethod
-    def space(self) -> Space:
-        """The space it fills. Raises CaseError where that cannot be made."""
 
     # -- the fluid itself
 
@@ -96,69 +84,12 @@ class ImmersedModel(FluidModel):
 
         return ImmersedBodies(*parts, shells=shells.shells(case, rods, case.fluid.kernel, space.spacing))
 
-    lowest_marker = -np.inf  # the height below which markers of bodies may not come
-
-    def with_bodies(self, rods: RodStack, immersed: Immersed, method: str, solver: Solver | None) -> Fluid:
-        """Stokes flow about rods and bodies: by the exact table, or with a ``solver`` by FFT."""
-        from ...fluids.shells.fourier import StokesByFFTWithBodies, TransformedBodies
-        from ...fluids.shells.stokes import ImmersedBodies, StokesWithBodies
-
-        assert isinstance(immersed, ImmersedBodies)
-        if solver is None:
-            return StokesWithBodies(immersed, self.lowest_marker)
-        transformed = TransformedBodies.of(immersed, solver, self.swimmers(rods, method))
-        return StokesByFFTWithBodies(transformed, self.lowest_marker)
-
-    def swimmers(self, rods: RodStack, method: str) -> tuple[Swimmer, ...]:
-        """The swimmers that a method by FFT solves for by themselves: all as one where M is the preconditioner."""
-        return swimmers.apart(self.case, rods) if method == "krylov" else (swimmers.whole(self.case, rods),)
-
-    def ingredients(self, rods: RodStack, fluid: Fluid) -> Immersed:
-        """The ingredients of a fluid: with bodies those that it has, whose tables serve; else made anew."""
-        if not rods.bodies:
-            return self.immersed(rods)
-        from ...fluids.shells.navier_stokes import NavierStokesWithBodies
-        from ...fluids.shells.stokes import StokesWithBodies
-
-        assert isinstance(fluid, StokesWithBodies | NavierStokesWithBodies)
-        return fluid.pushing
-
-    @cached_property
-    def markers(self) -> list[int]:
-        """How many markers each of the bodies has."""
-        fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.bodies)
-        return [0 if found is None else len(found.markers) for found in fits]
-
-    def reached(self, rods: RodStack) -> np.ndarray:
-        """Places (k, 3) at the start between which all that pushes is: nodes, and bodies to their largest semi-axes."""
-        r, sizes = [rods.start.r], [max(body.shape.semi_axes) for body in self.case.bodies.values()]
-        if rods.bodies:
-            centres = rods.start.r[rods.count : rods.count + 2 * len(sizes) : 2]
-            r += [centres + sign * np.array(sizes)[:, None] for sign in (-1.0, 1.0)]
-        return np.concatenate(r)
-
     def method(self, rods: RodStack) -> str:
         """The case's, or the cheapest by counts."""
         if self.case.fluid.method != "auto":
             return self.case.fluid.method
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
-
-    def with_markers(
-        self, rods: RodStack, evaluations: Mapping[str, float], pair: float = 1.0, inertia: float = 0.0
-    ) -> dict[str, float]:
-        """Seconds of a step with bodies by each method, from counts; ``evaluations``: of velocities by transforms.
-
-        ``pair`` is what a pair costs, over what it does in the periodic table, ``inertia`` what a fluid's own takes.
-        """
-        counts = [self._points(swimmer) for swimmer in swimmers.apart(self.case, rods)]
-        found = costs.with_markers(self.case, counts, self.components, evaluations, pair)
-        more = inertia if self.case.fluid.inertial else 0.0
-        return {method: seconds + more for method, seconds in found.items()}
-
-    def _points(self, swimmer: Swimmer) -> tuple[int, int]:
-        """How many nodes and markers a swimmer has."""
-        return sum(rod.stop - rod.start for rod in swimmer.rods), sum(self.markers[b] for b in swimmer.bodies)
 
     def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""
@@ -226,7 +157,7 @@ class ImmersedModel(FluidModel):
             out["bodies by nodes"] = 5 * 8.0 * rods.count * m * (6 * len(rods.bodies) + len(rods.motors))
         if method == "krylov":
             band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
-            alone = [sum(self._points(one)) for one in swimmers.apart(self.case, rods)] if rods.bodies else None
+            alone = [sum(both) for both in self.counts(rods)] if rods.bodies else None
             blocks = sum(8.0 * (self.components * k) ** 2 for k in alone or rods.group_sizes)
             out["preconditioner"] = (4 if alone else 1) * blocks + 2 * band
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
@@ -318,7 +249,8 @@ class ImmersedModel(FluidModel):
 
     def warnings(self, scene: Scene) -> list[str]:
         """Bodies that the grid tells badly."""
-        return shells.warnings(self.case, self.case.fluid.kernel, self.space.spacing, self.box)
+        dense = self.method(scene.rods) != "krylov"
+        return shells.warnings(self.case, self.case.fluid.kernel, self.space.spacing, self.box, dense)
 
     # -- pictures and recorded runs
 

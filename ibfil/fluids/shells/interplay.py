@@ -72,7 +72,13 @@ class ByTransforms:
     keeps = True
 
     def __init__(
-        self, immersed: ImmersedBodies, means: Means, nodes: Nodes, e3: np.ndarray, coming: np.ndarray | None, tau: float
+        self,
+        immersed: ImmersedBodies,
+        means: Means,
+        nodes: Nodes,
+        e3: np.ndarray,
+        coming: np.ndarray | None,
+        tau: float,
     ) -> None:
         """``nodes`` and markers, tangents ``e3`` (N, 3) of all rows, and how the flow carries nodes and markers,
 
@@ -129,7 +135,7 @@ class ByTransforms:
 
         found = self._sought(answer, lambda g: self._answer(alone, still, g), self._base[:, : self._c], allowed)
         self._pushes = found.pushes
-        out = Solution(*(np.zeros_like(y) for _ in range(3)), error)
+        out = Solution(np.zeros_like(y), np.zeros_like(y), np.zeros_like(y), error)
         for one, solution in zip(alone, found.parts, strict=True):
             for all_rows, own in zip(out[:3], solution[:3], strict=True):
                 all_rows[one.part.rows] = own
@@ -234,7 +240,9 @@ class ByTransforms:
             return -short(linear(units * z.reshape(units.shape)), 0.0)
 
         operator = LinearOperator((left.size, left.size), matvec=product, dtype=float)
-        z, failed = gmres(operator, left, rtol=0.0, atol=enough, restart=CYCLE, maxiter=MOST // CYCLE)
+        z, failed = gmres(
+            operator, left, rtol=0.0, atol=enough * np.sqrt(left.size), restart=CYCLE, maxiter=MOST // CYCLE
+        )
         if failed and not np.linalg.norm(left - product(z)) <= _WORST * all_of_it:
             raise np.linalg.LinAlgError(f"GMRES found no motions in {MOST} products with the FFT operator")
         self._found = self._found + units * z.reshape(units.shape)

@@ -26,7 +26,7 @@ class Swimmer(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """What a linear step is asked with (fluids/base.py)."""
+    """All that a linear step is asked with (fluids/base.py)."""
 
     force: np.ndarray
     stiffness: Stiffness
@@ -77,9 +77,7 @@ class Part:
         assert carried is not None
         here, at = self._inside(whole.held.at, m)
         held = Prescribed(at, whole.held.value[here], self._carried(carried, m))
-        return Statement(
-            whole.force[rows], self._part(whole.stiffness), held, whole.y[rows], whole.target[rows]
-        )
+        return Statement(whole.force[rows], self._part(whole.stiffness), held, whole.y[rows], whole.target[rows])
 
     def _part(self, whole: Stiffness) -> Stiffness:
         """Of the same stiffness the same part, whose factors serve."""

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 from .attached import attached_ends
 
 if TYPE_CHECKING:
-    from ..case.schema import Case
-    from ..fluids.shells.swimmer import Swimmer
-    from .stacked import RodStack
+    from ...case.schema import Case
+    from ...fluids.shells.swimmer import Swimmer
+    from ..stacked import RodStack
 
 
 def whole(case: Case, rods: RodStack) -> Swimmer:
     """All of a scene as one."""
-    from ..fluids.shells.swimmer import Swimmer
+    from ...fluids.shells.swimmer import Swimmer
 
     return Swimmer(rods.ranges, tuple(range(len(case.bodies))), tuple(range(len(rods.motors))))
 
 
 def apart(case: Case, rods: RodStack) -> tuple[Swimmer, ...]:
     """Each swimmer of a scene; a filament or a body that nothing is joined to is one by itself."""
-    from ..fluids.shells.swimmer import Swimmer
+    from ...fluids.shells.swimmer import Swimmer
 
     names, first = list(case.bodies), [where.start for where in rods.nodes]
     filaments = len(first)
