@@ -78,7 +78,8 @@ class NavierStokesModel(GridModel):
         from ...fluids.shells.stokes import ImmersedBodies
 
         assert isinstance(immersed, ImmersedBodies)
-        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background)
+        swimmers = self.swimmers(rods, method)
+        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background, swimmers=swimmers)
 
     def operators(
         self, rods: RodStack, immersed: Immersed, method: str, solver: Callable[[float], Solver]
