@@ -44,7 +44,7 @@ def means(runs: Sequence[tuple[Case, Mapping[str, Any], Mapping[str, float]]]) -
 
 
 def _but_for_the_seed(case: Case) -> str:
-    return repr(case.model_dump(exclude=_OF_THE_SEED))
+    return repr(case.model_dump(exclude=_OF_THE_SEED, warnings=False))  # defaults are made, not read: it doubts them
 
 
 def _mean(runs: Sequence[tuple[Case, Mapping[str, Any], Mapping[str, float]]]) -> Mean:
