@@ -12,6 +12,9 @@ from ibfil.commands import main as command_line
 from postprocess.docs import docstrings, sources
 from postprocess.docs.__main__ import main
 
+INDEX, API = sources.INDEX, sources.API
+ALONE = ("python", "keys", "commands")  # pages that no document is the source of
+
 PLAIN = """Forces of `Node`s, a*b and |d|, x_ of `two
 words`.
 
@@ -57,7 +60,8 @@ def test_a_docstring_keeps_its_equations_lists_and_examples():
 def pages(tmp_path_factory):
     out = tmp_path_factory.mktemp("pages") / "source"
     sources.write(out)
-    return {path.relative_to(out).as_posix(): path.read_text() for path in out.rglob("*.md")}
+    found = {path.relative_to(out): path.read_text() for path in out.rglob("*.md")}
+    return {(path.stem if path.stem in ALONE else path.as_posix()): text for path, text in found.items()}
 
 
 def test_every_package_and_every_module_has_its_place(pages):
@@ -68,25 +72,25 @@ def test_every_package_and_every_module_has_its_place(pages):
             if not path.stem.startswith("__"):
                 assert (
                     f"automodule:: {'.'.join(folder.relative_to(sources.ROOT).parts)}.{path.stem}\n"
-                    in pages[f"{name}/api.md"]
+                    in pages[f"{name}/{API}"]
                 )
-        above = "index.md" if name.count("/") < 2 else f"{name.rpartition('/')[0]}/index.md"
-        wanted = "ibfil/api" if name == "ibfil" else f"{name if above == 'index.md' else folder.name}/index"
+        above = INDEX if name.count("/") < 2 else f"{name.rpartition('/')[0]}/{INDEX}"
+        wanted = "ibfil/api" if name == "ibfil" else f"{name if above == INDEX else folder.name}/index"
         assert any(wanted in tree for tree in trees[above]), name
 
 
 def test_documents_lead_to_the_pages_of_others_and_to_modules(pages):
-    assert "[The gallery](cases/index.md)" in pages["index.md"]
-    assert "- [`loads.py`](api.md#loads): " in pages["ibfil/rods/index.md"]
+    assert f"[The gallery](cases/{INDEX})" in pages[INDEX]
+    assert f"- [`loads.py`]({API}#loads): " in pages[f"ibfil/rods/{INDEX}"]
     assert not any(re.search(r"\]\([^)]*(README.md|[.]py)\)", text) for text in pages.values())
 
 
 def test_public_names_keys_and_commands_have_a_page(pages):
     for name in ibfil.__all__:
-        assert name == "__version__" or f":: ibfil.{name}\n" in pages["python.md"]
-    assert "[filament.NAME]" in pages["keys.md"]
+        assert name == "__version__" or f":: ibfil.{name}\n" in pages["python"]
+    assert "[filament.NAME]" in pages["keys"]
     for module in command_line.COMMANDS:
-        assert f"usage: ibfil {module.NAME}" in pages["commands.md"]
+        assert f"usage: ibfil {module.NAME}" in pages["commands"]
 
 
 def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, monkeypatch, capsys):

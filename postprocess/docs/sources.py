@@ -12,6 +12,7 @@ import ibfil
 from ibfil.commands import main as command_line
 
 ROOT = Path(__file__).resolve().parents[2]
+INDEX, API = (f"{name}.md" for name in ("index", "api"))
 COPIED = {".md", ".png", ".csv"}
 README = re.compile(r"(\]\([^)\s]*?)README\.md")
 SOURCE = re.compile(r"(\]\([^)\s]*?)([\w-]+)\.py\)")
@@ -28,14 +29,13 @@ def write(out: Path) -> None:
         to = out / path.relative_to(ROOT)
         to.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix == ".md":
-            (to.with_name("index.md") if path.name == "README.md" else to).write_text(_page(path))
+            (to.with_name(INDEX) if path.name == "README.md" else to).write_text(_page(path))
         else:
             shutil.copyfile(path, to)
     for folder in sorted({path.parent for path in (ROOT / "ibfil").rglob("*.py")}):
-        (out / folder.relative_to(ROOT) / "api.md").write_text(_modules(folder))
-    (out / "python.md").write_text(_public())
-    (out / "keys.md").write_text(_keys())
-    (out / "commands.md").write_text(_commands())
+        (out / folder.relative_to(ROOT) / API).write_text(_modules(folder))
+    for name, text in (("python", _public()), ("keys", _keys()), ("commands", _commands())):
+        (out / name).with_suffix(".md").write_text(text)
 
 
 def _documents() -> list[Path]:
@@ -46,7 +46,7 @@ def _documents() -> list[Path]:
 
 def _page(path: Path) -> str:
     """A document with its links to pages, and, where it is the README.md of a folder, the tree of what is below it."""
-    text = SOURCE.sub(r"\1api.md#\2)", README.sub(r"\1index.md", path.read_text(encoding="utf-8")))
+    text = SOURCE.sub(rf"\1{API}#\2)", README.sub(rf"\1{INDEX}", path.read_text(encoding="utf-8")))
     if path.name != "README.md":
         return text
     if path.parent == ROOT:
@@ -54,7 +54,7 @@ def _page(path: Path) -> str:
     pages = sorted(one.stem for one in path.parent.glob("*.md") if one.name != "README.md")
     below = sorted(f"{one.parent.name}/index" for one in path.parent.glob("*/README.md"))
     api = ["api"] if list(path.parent.glob("*.py")) and "ibfil" in path.relative_to(ROOT).parts else []
-    return LISTED.sub(r"- [`\1.py`](api.md#\1):", text) + _tree("", [*pages, *api, *below])
+    return LISTED.sub(rf"- [`\1.py`]({API}#\1):", text) + _tree("", [*pages, *api, *below])
 
 
 def _tree(caption: str, pages: list[str]) -> str:
