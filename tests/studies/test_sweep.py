@@ -210,6 +210,21 @@ def test_from_python(tmp_path):
     assert all(row.outcome.done and row.numbers["span"] > 0 for row in rows)
 
 
+def test_a_sweep_over_seeds_ends_with_means_and_their_standard_errors(here, capsys):
+    """Of each viscosity over its two seeds; without heat a seed is nothing to average over."""
+    vary = ["--vary", "fluid.viscosity=1,2", "--vary", "thermal.seed=1,2"]
+    heat = ["thermal.energy=1e-4", "filament.rod.derivative=2", "time.end=0.01", "time.step=0.001"]
+    assert main.main(["sweep", "bent.toml", *heat, *vary]) == 0
+    with open("bent-sweep/sweep.csv", newline="") as file:
+        spans = [float(row["span"]) for row in csv.DictReader(file)]
+    with open("bent-sweep/sweep_means.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["fluid.viscosity"], row["seeds"]) for row in rows] == [("1", "2"), ("2", "2")]
+    for row, pair in zip(rows, (spans[:2], spans[2:]), strict=True):
+        assert float(row["span"]) == pytest.approx(np.mean(pair), rel=1e-9)
+        assert float(row["span +-"]) == pytest.approx(abs(pair[1] - pair[0]) / 2, rel=1e-6)
+
+
 def test_tables_keep_all_digits_and_json_has_no_nan(tmp_path):
     write_csv(tmp_path / "t.csv", [{"a": 0.1 + 0.2}, {"b": "x,y", "a": None}])
     assert (tmp_path / "t.csv").read_text() == 'a,b\n0.30000000000000004,\n,"x,y"\n'
@@ -275,20 +290,3 @@ def test_runs_of_several_seeds_are_summed_up():
         assert mean.values == {"x": 7}
         error = np.std([1.0, 2.0, 4.0], ddof=1) / np.sqrt(3)
         assert mean.row() == {"x": 7, "seeds": 3, "far": pytest.approx(7 / 3), "far +-": pytest.approx(error)}
-
-
-def test_a_sweep_over_seeds_ends_with_their_means(tmp_path):
-    (tmp_path / "hot.toml").write_text(BENT + '[thermal]\nenergy = 0.01\n[observe.far]\nkind = "end_to_end"\n')
-    words = [
-        "sweep",
-        str(tmp_path / "hot.toml"),
-        "time.end=0.005",
-        "--vary",
-        "thermal.seed=1,2",
-        "-o",
-        str(tmp_path / "out"),
-    ]
-    assert main.main(words) == 0
-    rows = list(csv.DictReader((tmp_path / "out" / "sweep_means.csv").open()))
-    assert rows[0]["seeds"] == "2"
-    assert float(rows[0]["far +-"]) > 0
