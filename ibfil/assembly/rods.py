@@ -213,7 +213,7 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     out = RodStack(names, tables, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined))
     if not case.bodies:
         return out
-    from .bodies import with_bodies
+    from .bodies.system import with_bodies
 
     return with_bodies(case, out)
 

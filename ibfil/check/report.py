@@ -171,6 +171,7 @@ def _costs(simulation: Simulation) -> list[str]:
     case, fluid = simulation.case, simulation.model.fluid_model
     unknowns = simulation.system.unknowns
     lines = [f"{simulation.rods.count} nodes with {unknowns} unknowns each; method {simulation.method}"]
+    lines += fluid.solved(simulation.rods)
     lines += fluid.size()
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
@@ -179,7 +180,7 @@ def _costs(simulation: Simulation) -> list[str]:
     lines.append(f"disk at most {_bytes(disk(simulation))}, fields compressed")
     methods = simulation.model.seconds
     if len(methods) > 1:
-        others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
+        others = ", ".join(f"{k} {v:.2g}" if np.isfinite(v) else f"{k} too large" for k, v in methods.items())
         lines.append(f"seconds a step, from counts: {others}")
     seconds = methods[simulation.method]
     fewest, steps = foretold_steps(simulation)

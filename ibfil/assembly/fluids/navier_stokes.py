@@ -85,7 +85,8 @@ class NavierStokesModel(GridModel):
         from ...fluids.shells.stokes import ImmersedBodies
 
         assert isinstance(immersed, ImmersedBodies)
-        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background)
+        swimmers = self.swimmers(rods, method)
+        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background, swimmers=swimmers)
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """Of the velocity that the fluid has."""

@@ -68,15 +68,23 @@ class GridModel(ImmersedModel):
         """Extents, in cells, of the box that holds the filaments' stencils at the start."""
         from ...grid.pruned_fft import bounding_box
 
-        base, _ = self.space.stencil(self.kernel, rods.start.r)
+        base, _ = self.space.stencil(self.kernel, self.reached(rods))
         return bounding_box(base, self.kernel.points, self.grid.cells)[1]
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         if rods.bodies:
-            return self.by_table(rods, inertia=costs.of_inertia(self.grid.cells.tolist(), self.components))
+            return self._of_bodies(rods)
         counts = rods.group_sizes
         return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
+
+    def _of_bodies(self, rods: RodStack) -> dict[str, float]:
+        """The same with bodies."""
+        cells, points = self.grid.cells.tolist(), rods.count + sum(self.markers)
+        by = {"fft": (self.components - 2) * costs.full_evaluation(cells) + points * costs.SPREAD}
+        if self.components == 3 and not self.case.fluid.inertial:
+            by["pruned"] = costs.pruned_evaluation(cells, self._sizes(rods)) + points * costs.SPREAD
+        return self.with_markers(rods, by, inertia=costs.of_inertia(cells, self.components))
 
     def evaluation(self, rods: RodStack) -> float:
         """By whole FFTs, or those of the filaments' box."""

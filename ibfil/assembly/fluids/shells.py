@@ -127,8 +127,8 @@ def _many(numbers: np.ndarray) -> str:
     return ", ".join(dict.fromkeys(f"{x:+.2g}" for x in numbers))
 
 
-def warnings(case: Case, kernel: str, h: float, box: np.ndarray | None) -> list[str]:
-    """Bodies that the grid tells badly, or whose markers are many."""
+def warnings(case: Case, kernel: str, h: float, box: np.ndarray | None, dense: bool) -> list[str]:
+    """Bodies that the grid tells badly, or whose markers are many for one ``dense`` system."""
     out, count = [], 0
     for name, body in case.bodies.items():
         found = fit(case, name, kernel, h)
@@ -143,6 +143,9 @@ def warnings(case: Case, kernel: str, h: float, box: np.ndarray | None) -> list[
             )
         if box is not None and 2 * longest > 0.5 * float(box.min()):
             out.append(f"body.{name}: longer than half the box: its images are as near as it is long")
-    if count > MANY:
-        out.append(f"bodies have {count} markers: a step takes seconds beyond {MANY}; take a coarser grid")
+    if dense and count > MANY:
+        out.append(
+            f"bodies have {count} markers: a step takes seconds beyond {MANY}; take a coarser grid, or where they are "
+            'of several swimmers method = "krylov"'
+        )
     return out

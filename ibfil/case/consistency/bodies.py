@@ -143,8 +143,6 @@ def _fluid(case: Scene, key: str) -> Iterator[Fault]:
     fluid = case.fluid
     if not fluid.on_grid:
         return
-    if fluid.method not in ("auto", "table"):
-        yield Fault("fluid.method", f"{shown(fluid.method)} in a scene with bodies", '"table" or "auto"', (key,))
     if fluid.single:
         yield Fault("fluid.precision", f"{shown(fluid.precision)} in a scene with bodies", '"double"', (key,))
     if fluid.thin_axis is not None:

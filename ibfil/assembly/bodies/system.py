@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bodies.body import NOTHING, Attachment, Body, Motor, OfTime
-from ..bodies.system import RodsWithBodies
-from ..case.table import ORIGIN
-from ..rods.boundary_conditions import spinning, steady, turned
+from ...bodies.body import NOTHING, Attachment, Body, Motor, OfTime
+from ...bodies.system import RodsWithBodies
+from ...case.table import ORIGIN
+from ...rods.boundary_conditions import spinning, steady, turned
+from ..loads import number, triple
 from .attached import InBody, attached_ends, check_places
-from .loads import number, triple
 from .supports import supports
 
 if TYPE_CHECKING:
-    from ..case.bodies import body as tables
-    from ..case.bodies.motor import Motor as MotorTable
-    from ..case.schema import Case
-    from ..rods.base import Load
-    from ..rods.geometry import Configuration
-    from .stacked import RodStack
+    from ...case.bodies import body as tables
+    from ...case.bodies.motor import Motor as MotorTable
+    from ...case.schema import Case
+    from ...rods.base import Load
+    from ...rods.geometry import Configuration
+    from ..stacked import RodStack
 
 
 def with_bodies(case: Case, rods: RodStack) -> RodStack:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import CaseError
+from ...errors import CaseError
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
-    from ..case.bodies.end import End
-    from ..case.schema import Case
-    from ..rods.geometry import Configuration
-    from .stacked import RodStack
+    from ...bodies.body import Body
+    from ...case.bodies.end import End
+    from ...case.schema import Case
+    from ...rods.geometry import Configuration
+    from ..stacked import RodStack
 
 INSIDE = 0.5  # of a segment, that nodes may be within a body
 _PARALLEL = 1e-6
