@@ -31,7 +31,6 @@ from ...linalg.stiffness import Stiffness, no_pairs
 from ..base import Solution
 from .shell import Shells
 
-
 FEW = 300  # unknowns of nodes, whose matrix is factored again in less time than an iteration with an old one takes
 
 
@@ -53,7 +52,7 @@ class Rigid:
         at: slice | np.ndarray = slice(rods, None)
         if components > 3:  # markers do not spin
             at = np.arange(rods, len(matrix)).reshape(-1, components)[:, :3].ravel()
-        self._lower, fault = dpotrf(matrix[at][:, at].T, lower=1, clean=0)  # symmetric, and LAPACK takes rows for columns
+        self._lower, fault = dpotrf(matrix[at][:, at].T, lower=1, clean=0)  # symmetric: LAPACK takes rows for columns
         if fault:
             raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0)
         right = np.empty((rods + levers.shape[1] + 1, len(levers)))
@@ -200,7 +199,8 @@ class WithShells:
         known[1:, at[len(at) - len(carried.at) :]] = carried.lever.T
         forces, base = np.empty((1 + p, n, m)), np.zeros((1 + p, n, m))
         forces[0], base[0] = pushed
-        forces[1:], base[1:, :, : self._c] = carried.columns.transpose(2, 0, 1), self._rigid.by_bodies.T.reshape(p, n, -1)
+        forces[1:] = carried.columns.transpose(2, 0, 1)
+        base[1:, :, : self._c] = self._rigid.by_bodies.T.reshape(p, n, self._c)
         found = self._corrections(stiffness, at, known, forces, base)
         first, each = _Nodes(*(part[:1] for part in found)), _Nodes(*(part[1:] for part in found))
         self._each = _Each((stiffness, carried.lever, carried.columns), each)
