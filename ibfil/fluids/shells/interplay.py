@@ -3,7 +3,7 @@
 All nodes and markers have the mobility M by FFT; M~ is the exact matrix of each swimmer, and nothing between them. With
 motions g, over the step, that come to a swimmer from elsewhere, it answers exactly (response.py): forces F(g) that obey
 all its balances to round-off, markers that move rigidly, and motions b + g + tau M~ F(g), where b are those without any
-force. What does come from elsewhere is tau (M - M~) F, so that g is sought with
+force. Those that do come are tau (M - M~) F, so that g is sought with
 
     b + tau M F(g) = b + g + tau M~ F(g)
 
