@@ -23,10 +23,11 @@ def lines() -> Iterator[str]:
     with tempfile.TemporaryDirectory() as folder:
         ibfil.run(Path(__file__).with_name("whip.toml"), Path(folder) / "truth.h5")
         with ibfil.open(Path(folder) / "truth.h5") as run:
-            yield "t_ms,x_um,y_um"
-            for time, shape in zip(run.time[1:], run.position("fibre")[1:], strict=True):
-                for x, y in shape[::EVERY, :2] + noise.normal(0, NOISE, (len(shape[::EVERY]), 2)):
-                    yield f"{1e3 * time:.0f},{x:.4f},{y:.4f}"
+            some = run.arclength("fibre")[::EVERY]
+            yield "t_ms,s_um,x_um,y_um"
+            for time, shape in zip(run.time[1:], run.position("fibre")[1:, ::EVERY, :2], strict=True):
+                for s, (x, y) in zip(some, shape + noise.normal(0, NOISE, shape.shape), strict=True):
+                    yield f"{1e3 * time:.0f},{s:.1f},{x:.4f},{y:.4f}"
 
 
 if __name__ == "__main__":
