@@ -1,8 +1,8 @@
 """Shipped or given cases run, and their [expect] numbers held against the results: `ibfil verify`.
 
-With error bars each case is run at other levels of step and nodes too, as `ibfil uncertainty` does, and every number that
-is found has the bar of that rule. What is expected is met by the number as it is; where the bar is wider than what
-is allowed that is told, since finer levels might decide otherwise.
+With error bars each case is run at other levels of step and nodes too, as by `ibfil uncertainty`, and every number that
+is found has the bar of that rule. What is expected is met by the number as it is; a bar that is wider than what is
+allowed is told, since finer levels might decide otherwise.
 """
 
 from __future__ import annotations
