@@ -64,7 +64,8 @@ class Spectrum:
 
         moved = self.motion.relaxation(dt, definite=True)
         step = np.eye(len(self.values)) + dt * np.column_stack([moved(column) for column in self.motion.matrix.T])
-        return _course(*eig(step, check_finite=True))
+        factors, vectors = eig(step, check_finite=True)
+        return _course(factors, vectors)
 
 
 def _course(factors: np.ndarray, vectors: np.ndarray) -> Course:
