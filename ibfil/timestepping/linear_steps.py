@@ -76,7 +76,7 @@ def apart(motion: LinearMotion, there: Configuration) -> np.ndarray:
     """The displacements (k,) of the unconstrained unknowns from the configuration of ``motion`` to another one."""
     here, out = motion.configuration, np.zeros(motion.shape)
     out[:, :3] = there.r - here.r
-    if out.shape[1] == 4:
+    if motion.system.unknowns == 4:
         carried, _ = transport(here.e1, here.e3, there.e3, np.zeros(len(out)))
         across = np.cross(there.e3, carried)
         out[:, 3] = np.arctan2((there.e1 * across).sum(axis=1), (there.e1 * carried).sum(axis=1))
