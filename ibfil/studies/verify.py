@@ -1,7 +1,7 @@
 """Shipped or given cases run, and their [expect] numbers held against the results: `ibfil verify`.
 
 With error bars each case is run at other levels of step and nodes too, as by `ibfil uncertainty`, and every number that
-is found has the bar of that rule. What is expected is met by the number as it is; a bar that is wider than what is
+is found has the bar of that rule. An expectation is met by the number as it is; a bar that is wider than what is
 allowed is told, since finer levels might decide otherwise.
 """
 
