@@ -131,7 +131,7 @@ def _with_bars(one: Planned) -> tuple[Mapping[str, Summary], dict[str, Bar]]:
 
 
 def _told(held: Check, bar: Bar | None) -> str:
-    """What was expected and found, with its error bar where there is one, and what that leaves open."""
+    """The expected and the found number, with its error bar where there is one, and what that leaves open."""
     found = f"{held.found:.6g}" if isinstance(held.found, float) else str(held.found)
     notes = [held.note] if held.note else []
     if bar is not None and bar.nothing:
