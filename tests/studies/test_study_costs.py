@@ -1,4 +1,4 @@
-"""What studies cost: in counts of runs, which no machine changes, and in the processor time of one sitting."""
+"""Costs of studies, in counts of runs, which no machine changes, and in the processor time of one sitting."""
 
 from __future__ import annotations
 

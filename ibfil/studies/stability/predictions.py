@@ -76,7 +76,7 @@ def _rest(simulation: Simulation) -> Rest | None:
 
 
 def predicted(simulation: Simulation, rests: Rests) -> Prediction:
-    """What is foretold of a simulation that has not begun."""
+    """The prediction for a simulation that has not begun."""
     from ...assembly.fluids.grid_warnings import LOCKING_SPACING
     from ...check.dimensionless import groups
     from ...simulation.steps import LONG_PHASE
@@ -98,7 +98,7 @@ def predicted(simulation: Simulation, rests: Rests) -> Prediction:
 
 
 def _about_rest(simulation: Simulation, rest: Rest) -> Prediction:
-    """What becomes of the start, small as it is, by the scheme and by the motion itself."""
+    """The prediction from the course of the start, small as it is, by the scheme and by the motion itself."""
     dt, times = _steps(simulation.case, simulation.step_length)
     spectrum, scheme = rest.spectrum, simulation.model.stepper
     steps = spectrum.steps(scheme, dt)
