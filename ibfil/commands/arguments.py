@@ -127,4 +127,4 @@ def say_if_cold() -> None:
     cache = Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache_path("numba", appauthor=False))
     elsewhere = cache / f"{package.name}_{hashlib.sha1(str(package).encode()).hexdigest()}"
     if not any((package / "__pycache__").glob("*.nbi")) and not any(elsewhere.glob("*.nbi")):
-        warn("compiling the numerical kernels, once: half a minute or so")
+        warn("compiling the numerical kernels, once: ten seconds to half a minute")

@@ -16,13 +16,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..grid.fft import modes_of
 from ..grid.fftw import pyfftw
 from ..grid.periodic_grid import Grid
 from ..grid.slab_fft import Block
 from ..grid.spectral import solenoidal
+from ..linalg.compiled import njit
 from .advection import filters
 
 

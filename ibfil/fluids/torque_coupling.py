@@ -33,7 +33,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from scipy.fft import irfftn
 
 from ..grid.far_pairs import moments
@@ -41,6 +40,7 @@ from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol, half_curl, project
 from ..grid.spreading import interpolate, spread
+from ..linalg.compiled import njit
 from .mobility_table import COMPONENTS, IN_ANY_ORDER, Octant, point_response, sum_any
 from .velocity_gradient import advected
 

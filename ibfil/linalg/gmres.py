@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse.linalg import LinearOperator, gmres
+
+from .lapack import dgetrf, dgetrs
 
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
 CYCLE = 60  # vectors GMRES keeps
@@ -91,6 +91,8 @@ def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float,
 
     Where rounding does not let it come so far, 1e-6 will do.
     """
+    from scipy.sparse.linalg import LinearOperator, gmres
+
     count, errors = 0, [np.inf]
 
     def measured(z: np.ndarray) -> np.ndarray:

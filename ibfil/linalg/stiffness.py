@@ -11,9 +11,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from . import banded
+from .compiled import njit
 
 NO_NODES = np.zeros(0, np.int64)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from ..grid.spreading import Stencil
+from ..linalg.compiled import njit
 from .division import Division
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..fluids.base import Fluid, Response, Solution
+from ..linalg.compiled import njit
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
 from .base import FAILURES, Bodies, NotConverged, State, Step, StiffnessOf, System, _finish, valueless
