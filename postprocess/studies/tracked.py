@@ -1,4 +1,4 @@
-"""The points of whip.toml that a camera would see: its points with noise, as python tracked.py writes it into tracked.csv.
+"""The points of whip.toml as a camera would see them, with noise: python tracked.py writes them into tracked.csv.
 
 25 frames, 8 ms apart, of 13 points along the fibre; each coordinate is off by a normal error of 0.12 um, 1 % of the
 length, independent of all others.
