@@ -11,6 +11,7 @@ from . import first_step as bench_first_step
 from . import linked as bench_linked
 from . import many as bench_many
 from . import pieces
+from . import processes as bench_processes
 from . import spaces as bench_spaces
 from . import swimming as bench_swimming
 from . import thermal as bench_thermal
@@ -69,6 +70,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "body": lambda: bench_swimming.heads(),
     "threads": threads,
     "many": lambda: many(),
+    "mpi": lambda: bench_processes.measured(),
 }
 USUAL = ("pieces", "swimmer")
 

@@ -80,11 +80,24 @@ class SharedTransform:
 
     def from_blocks(self, fields: int, fill: Callable[[Block], None]) -> np.ndarray:
         """The first ``fields`` of ``real``, times the cells, of modes that ``fill`` puts into each row's block."""
-        backward = self._along[fields][1]
         for j in range(self.modes.shape[2]):
             fill(Block(self._room[:fields], 0, j))
-            backward.execute()
-            self.modes[:fields, :, j] = self._room[:fields, :, 0]
+            self._put_back(fields, j)
+        return self._planes_of(fields)
+
+    def multiply(self, fields: int, symbol: Callable[[Block], None]) -> np.ndarray:
+        """The first ``fields`` of ``real``, times the cells, after ``symbol`` is applied to each row's block."""
+        for block in self.blocks(fields):
+            symbol(block)
+            self._put_back(fields, block.j)
+        return self._planes_of(fields)
+
+    def _put_back(self, fields: int, j: int) -> None:
+        """The row j of ``modes``, transformed along x, from the modes in the room."""
+        self._along[fields][1].execute()
+        self.modes[:fields, :, j] = self._room[:fields, :, 0]
+
+    def _planes_of(self, fields: int) -> np.ndarray:
         for field in range(fields):
             self._to_planes(field)
         return self.real
