@@ -54,7 +54,8 @@ class GridPart:
         """Velocities at nodes that ``vectors`` (n, 3 v) on them drive, and half the vorticities where v = 2."""
         t, fields = self.transform, 3 * self.vectors
         self.nodes.spread(vectors, fields, t.real)
-        return self.nodes.felt(fields, t.multiply(fields, partial(self._solve, viscosity, alpha)))
+        u = t.multiply(fields, partial(self._solve, viscosity, alpha), self.nodes.touched)
+        return self.nodes.felt(fields, u)
 
     def _solve(self, viscosity: float, alpha: float, block: Block) -> None:
         """From the modes of forces, and of torques, in the block to those of velocities, and half their curl."""
