@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import CaseError
-from .share import BOX, Network, Timed, least, step
+from .share import BOX, Network, Timed, least, of_step, share
 from .timing import Row
 
 MANY, CELLS, TURNS = 64, 128, 10
@@ -143,6 +143,7 @@ def rows(found: list[Piece], cells: int, here: Network, copy: float, turns: int)
     """What was measured, and foretold of it; ``copy`` is the bandwidth of a copy in memory."""
     name, ratio = "all to all between two processes", here.bandwidth / copy
     out = [Row(name, here.bandwidth, "a copy in memory", copy, ratio, None, "B/s")]
+    shares = {(many, size): share(size, many, turns) for many, size in ((2, cells), (MANY, cells), (MANY, 2 * cells))}
     for piece in found:
         text = f"{piece.name}: two processes, times two"
         out.append(Row(text, 2 * piece.two, "one process", piece.one, 2 * piece.two / piece.one, BAR))
@@ -154,7 +155,7 @@ def rows(found: list[Piece], cells: int, here: Network, copy: float, turns: int)
         ):
             more = (size / cells) ** 3 * math.log(size) / math.log(cells)
             one = piece.alone + more * (piece.one - piece.alone)
-            all_of_them = many * step(piece.alone, piece.calls, network, size, many, turns)
+            all_of_them = many * of_step(piece.alone, piece.calls, shares[many, size], network, size, many)
             text = f"  foretold at {size}^3: {many} processes, times {many}; {words}"
             out.append(Row(text, all_of_them, "one process", one, all_of_them / one, None))
     return out

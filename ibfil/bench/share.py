@@ -5,7 +5,8 @@ counted apart, by bandwidth and latency. So shares of 64 are measured on one cor
 
     T(P) = T_0 + sum over calls of the share's seconds + exchanges [bytes (P - 1)/P^2 / bandwidth + (P - 1) latency]
 
-T_0 is what process 0 does besides; bytes are those of a component's modes, in an exchange each way.
+T_0 is what process 0 does besides; bytes are those of a component's modes, in an exchange each way. Nodes are taken to
+touch all planes: where they do not, there is less to do and to send.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from ..grid.kernels import KERNELS
 from ..parallel.inertia import InertialPart
 from ..parallel.part import GridPart
 from ..parallel.ranks import Ranks
-from .timing import nodes_and_forces
 
 BOX = (3.2, 3.2, 3.2)
 
@@ -106,11 +106,13 @@ EXCHANGES = {"velocity": 6, "coast": 3, "push": 3 + 6 + 3, "place": 0}  # of com
 
 
 def share(cells: int, processes: int, turns: int) -> dict[str, float]:
-    """Seconds that each kind of call takes one of so many processes, messages apart."""
-    comm, kernel = Absent(processes), KERNELS["peskin4"]
+    """Seconds that each kind of call takes one of so many processes, messages apart, where nodes touch all planes."""
+    comm = Absent(processes)
     grid = GridPart(comm, BOX, (cells,) * 3)
-    base, around, force = nodes_and_forces(grid.grid, "peskin4", 41)
-    stencil = type(kernel.stencil(np.zeros((1, 3))))(base, around)
+    r = np.zeros((cells // 2, 3))
+    r[:, 0] = np.linspace(-0.5, 0.5, len(r)) * BOX[0]
+    stencil, force = KERNELS["peskin4"].stencil(grid.grid.coordinates(r)), np.cos(np.arange(3.0 * len(r)))
+    force = force.reshape(-1, 3)
     grid.place(stencil)
     found = {"velocity": least(lambda: grid.velocity(1.0, 0.0, force), turns)}
     found["place"] = least(lambda: grid.place(stencil), turns)
@@ -122,9 +124,10 @@ def share(cells: int, processes: int, turns: int) -> dict[str, float]:
     return found
 
 
-def step(alone: float, calls: Counter[str], network: Network, cells: int, processes: int, turns: int) -> float:
-    """Seconds of a step that makes such calls, and takes process 0 ``alone`` besides."""
-    shares = share(cells, processes, turns)
+def of_step(
+    alone: float, calls: Counter[str], shares: dict[str, float], network: Network, cells: int, processes: int
+) -> float:
+    """Seconds of a step that makes such calls, of such ``shares``, and takes process 0 ``alone`` besides."""
     exchanges = sum(EXCHANGES[kind] * count for kind, count in calls.items())
     work = sum(shares[kind] * count for kind, count in calls.items())
     return alone + work + exchanges * network.exchange(cells, processes)
