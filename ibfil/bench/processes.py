@@ -2,8 +2,9 @@
 
 Under mpiexec, two processes of one thread each take turns: process 0 alone, as a run of one process, while the other
 naps; then both; of each the least of the turns. On a machine whose cores have other work two processes wait for each
-other, and no least of turns is without that: share.py foretells from what each does by itself, with the bandwidth and
-latency between these two, a copy in memory, and with 0.5 GB/s and 2 us, the part of one process of many in a network.
+other, and no least of turns is without that: share.py foretells from seconds of work of one by itself, with the
+bandwidth and latency between these two, a copy in memory, and with 0.5 GB/s and 2 us, the part of one of many in a
+network.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import CaseError
-from .share import BOX, Network, Timed, least, of_step, share
+from .share import BOX, Network, Seconds, Timed, least, of_step, share, timed
 from .timing import Row
 
 MANY, CELLS, TURNS = 64, 128, 10
@@ -66,29 +67,30 @@ class Messages:
             self._comm.barrier()
             self._comm.Alltoallv([sent, each], [come, each])
 
-        return least(exchange, turns)
+        return least(exchange, turns).wall
 
 
 class Piece(NamedTuple):
-    """A piece of a run: seconds by one process and by two; of the latter those besides calls, and the calls."""
+    """A piece of a run by one process and by two: seconds; of the latter the work besides calls, and the calls."""
 
     name: str
-    one: float
-    two: float
+    one: Seconds
+    two: Seconds
     alone: float
     calls: Counter[str]
 
 
 def _turns(name: str, ranks: Timed, one: Callable[[], object], two: Callable[[], object], turns: int) -> Piece:
     """Both in turn; the least of each."""
-    ones, twos = [], []
+    ones, twos, alone, calls = [], [], math.inf, Counter[str]()
     for _ in range(turns):
-        ones.append(least(one, 1))
+        ones.append(timed(one))
         ranks.look()
-        seconds = least(two, 1)
+        twos.append(timed(two))
         called, calls = ranks.look()
-        twos.append((seconds, seconds - called, calls))
-    return Piece(name, min(ones), min(each[0] for each in twos), min(each[1] for each in twos), twos[-1][2])
+        alone = min(alone, twos[-1].work - called)
+    one_best, two_best = (Seconds(*map(min, zip(*each, strict=True))) for each in (ones, twos))
+    return Piece(name, one_best, two_best, alone, calls)
 
 
 def pieces(ranks: Timed, cells: int, turns: int) -> list[Piece]:
@@ -146,7 +148,9 @@ def rows(found: list[Piece], cells: int, here: Network, copy: float, turns: int)
     shares = {(many, size): share(size, many, turns) for many, size in ((2, cells), (MANY, cells), (MANY, 2 * cells))}
     for piece in found:
         text = f"{piece.name}: two processes, times two"
-        out.append(Row(text, 2 * piece.two, "one process", piece.one, 2 * piece.two / piece.one, BAR))
+        out.append(
+            Row(text, 2 * piece.two.wall, "one process", piece.one.wall, 2 * piece.two.wall / piece.one.wall, BAR)
+        )
         for many, size, network, words in (
             (2, cells, here, "messages as here"),
             (MANY, cells, here, "messages as here"),
@@ -154,10 +158,10 @@ def rows(found: list[Piece], cells: int, here: Network, copy: float, turns: int)
             (MANY, 2 * cells, NETWORK, "0.5 GB/s and 2 us a message"),
         ):
             more = (size / cells) ** 3 * math.log(size) / math.log(cells)
-            one = piece.alone + more * (piece.one - piece.alone)
+            one = piece.alone + more * (piece.one.work - piece.alone)
             all_of_them = many * of_step(piece.alone, piece.calls, shares[many, size], network, size, many)
             text = f"  foretold at {size}^3: {many} processes, times {many}; {words}"
-            out.append(Row(text, all_of_them, "one process", one, all_of_them / one, None))
+            out.append(Row(text, all_of_them, "work of one process", one, all_of_them / one, None))
     return out
 
 
@@ -191,7 +195,7 @@ def main(cells: int, turns: int) -> None:
         messages, room = ranks.make(Messages), np.zeros(numbers, complex)
         latency = messages.call("least", 1, 200)
         bandwidth = 16.0 * numbers / messages.call("least", numbers, turns)
-        copy = 16.0 * numbers / least(partial(np.copyto, np.zeros_like(room), room), turns)
+        copy = 16.0 * numbers / least(partial(np.copyto, np.zeros_like(room), room), turns).wall
         found = pieces(ranks, cells, turns)
     print(json.dumps([asdict(row) for row in rows(found, cells, Network(bandwidth, latency), copy, turns)]))
 

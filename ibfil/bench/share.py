@@ -70,7 +70,7 @@ class Absent:
 
 
 class Timed(Ranks):
-    """Processes, the seconds that calls took since they were last looked at, and how many there were of each."""
+    """Processes, the seconds of work in calls since they were last looked at, and how many there were of each."""
 
     def __init__(self, comm: Any) -> None:
         super().__init__(comm)
@@ -85,28 +85,38 @@ class Timed(Ranks):
 
     def call(self, shared: Any, method: str, *given: Any) -> Any:
         """That of Ranks."""
-        began = time.perf_counter()
+        began = time.process_time()
         out = super().call(shared, method, *given)
-        self.seconds += time.perf_counter() - began
+        self.seconds += time.process_time() - began
         self.calls[method] += 1
         return out
 
 
-def least(work: Callable[[], object], turns: int) -> float:
-    """The least seconds of a call."""
-    times = []
-    for _ in range(turns):
-        began = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - began)
-    return min(times)
+class Seconds(NamedTuple):
+    """By the clock on the wall, and of work on a core: the same for one process on a machine that has nothing else."""
+
+    wall: float
+    work: float
+
+
+def timed(work: Callable[[], object]) -> Seconds:
+    """Those of a call."""
+    wall, worked = time.perf_counter(), time.process_time()
+    work()
+    return Seconds(time.perf_counter() - wall, time.process_time() - worked)
+
+
+def least(work: Callable[[], object], turns: int) -> Seconds:
+    """The least of each."""
+    walls, works = zip(*(timed(work) for _ in range(turns)), strict=True)
+    return Seconds(min(walls), min(works))
 
 
 EXCHANGES = {"velocity": 6, "coast": 3, "push": 3 + 6 + 3, "place": 0}  # of components
 
 
 def share(cells: int, processes: int, turns: int) -> dict[str, float]:
-    """Seconds that each kind of call takes one of so many processes, messages apart, where nodes touch all planes."""
+    """Seconds of work of each kind of call for one of so many processes, where nodes touch all planes."""
     comm = Absent(processes)
     grid = GridPart(comm, BOX, (cells,) * 3)
     r = np.zeros((cells // 2, 3))
@@ -114,13 +124,13 @@ def share(cells: int, processes: int, turns: int) -> dict[str, float]:
     stencil, force = KERNELS["peskin4"].stencil(grid.grid.coordinates(r)), np.cos(np.arange(3.0 * len(r)))
     force = force.reshape(-1, 3)
     grid.place(stencil)
-    found = {"velocity": least(lambda: grid.velocity(1.0, 0.0, force), turns)}
-    found["place"] = least(lambda: grid.place(stencil), turns)
+    found = {"velocity": least(lambda: grid.velocity(1.0, 0.0, force), turns).work}
+    found["place"] = least(lambda: grid.place(stencil), turns).work
     fluid = InertialPart(comm, BOX, (cells,) * 3, 1, 1, float, 10.0, 1.0)
     fluid.place(stencil)
     past = weights(10.0 / 0.0125, 0.0125, 0.0, 0.0)
-    found["coast"] = least(lambda: fluid.coast(past), turns)
-    found["push"] = least(lambda: fluid.push(past, (), force), turns)
+    found["coast"] = least(lambda: fluid.coast(past), turns).work
+    found["push"] = least(lambda: fluid.push(past, (), force), turns).work
     return found
 
 
