@@ -142,7 +142,7 @@ def _stepper(text: str) -> Callable[[], None]:
 
 
 def rows(found: list[Piece], cells: int, here: Network, copy: float, turns: int) -> list[Row]:
-    """What was measured, and foretold of it; ``copy`` is the bandwidth of a copy in memory."""
+    """The numbers that were measured, and foretold of them; ``copy`` is the bandwidth of a copy in memory."""
     name, ratio = "all to all between two processes", here.bandwidth / copy
     out = [Row(name, here.bandwidth, "a copy in memory", copy, ratio, None, "B/s")]
     shares = {(many, size): share(size, many, turns) for many, size in ((2, cells), (MANY, cells), (MANY, 2 * cells))}
@@ -181,7 +181,7 @@ def measured(cells: int = CELLS, turns: int = TURNS) -> list[Row]:
 
 
 def main(cells: int, turns: int) -> None:
-    """What each of the two processes does; process 0 prints the rows as JSON."""
+    """The work of each of the two processes; process 0 prints the rows as JSON."""
     from ..parallel.ranks import join, serve
     from ..threads import one_thread_of_blas
 

@@ -1,4 +1,4 @@
-"""What one process of many takes for its share of a grid, measured by a process alone, and what a step takes of it.
+"""The work of one process of many on its share of a grid, measured by a process alone, and of a step from it.
 
 The share is that of process 0 of P in everything but what the others would send: they send nothing, and messages are
 counted apart, by bandwidth and latency. So shares of 64 are measured on one core.
@@ -56,7 +56,7 @@ class Absent:
         return [value]
 
     def Scatterv(self, sent: list[Any], come: np.ndarray) -> None:
-        """What it sends itself."""
+        """The part that it sends itself."""
         come.ravel()[:] = sent[0].ravel()[: come.size]
 
     def Gatherv(self, sent: np.ndarray, come: list[Any]) -> None:

@@ -77,7 +77,7 @@ class SharedTransform:
         }
 
     def _cut(self, planes: np.ndarray) -> _Cut:
-        """What is sent where only these ``planes`` (k,) of points, in order, are looked at or not zero."""
+        """The parts that are sent where only these ``planes`` (k,), in order, are looked at, or not zero."""
         comm, (_, _, own, half) = self._comm, self.modes.shape
         counts = [int(count) for count in np.diff(np.searchsorted(planes, self.planes.starts))]
         mine = planes[(planes >= self.planes.starts[comm.rank]) & (planes < self.planes.starts[comm.rank + 1])]

@@ -1,4 +1,4 @@
-"""What tests of parallel/ run under mpiexec: `mpiexec -n P python on_processes.py WORD`."""
+"""The programs that tests of parallel/ run under mpiexec: `mpiexec -n P python on_processes.py WORD`."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ UNPARTED = INERTIA.replace("[time]", 'flow = ["sin(2*pi*y/2.75 - 3*t)*exp(cos(2*
 
 
 def together(count: int, *words: object, folder: Path, status: int = 0) -> str:
-    """What so many processes print, to both streams; they end with ``status``."""
+    """The lines that so many processes print, to both streams; they end with ``status``."""
     surroundings = {"OMP_NUM_THREADS": "1", **os.environ, "PYTHONPATH": str(Path(ibfil.__file__).parent.parent)}
     line = [MPIEXEC, "-n", str(count), sys.executable, *map(str, words)]
     done = subprocess.run(line, cwd=folder, env=surroundings, capture_output=True, text=True, timeout=300, check=False)
