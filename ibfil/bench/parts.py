@@ -12,6 +12,7 @@ from . import linked as bench_linked
 from . import many as bench_many
 from . import members as bench_members
 from . import pieces
+from . import processes as bench_processes
 from . import spaces as bench_spaces
 from . import swimming as bench_swimming
 from . import thermal as bench_thermal
@@ -73,6 +74,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "threads": threads,
     "many": lambda: many(),
     "members": lambda: bench_members.members(),
+    "mpi": lambda: bench_processes.measured(),
 }
 USUAL = ("pieces", "swimmer")
 

@@ -40,7 +40,7 @@ def do(arguments: argparse.Namespace) -> int:
     if comm.rank:
         serve(comm)
         return DONE
-    with Ranks(comm):
+    with Ranks(comm) as ranks, ranks.sharing():
         return _do(arguments)
 
 

@@ -50,7 +50,7 @@ class InertialPart(GridPart):
                 block.modes[3:] = 0.0
                 self.half_curl(block, block.modes[:3], block.modes[3:])
 
-        return self.nodes.felt(fields, self.transform.from_blocks(fields, fill))
+        return self.nodes.felt(fields, self.transform.from_blocks(fields, fill, self.nodes.touched))
 
     def push(self, past: Weights, factors: Sequence[float], vectors: np.ndarray | None) -> float:
         """The step is taken with what nodes put onto the grid; ``factors`` of the background's parts at its end.
@@ -59,7 +59,7 @@ class InertialPart(GridPart):
         """
         t, fields = self.transform, 3 * self.vectors
         self.nodes.spread(vectors, fields, t.real)
-        for block in t.blocks(fields):
+        for block in t.blocks(fields, self.nodes.touched):
             if self.vectors == 2:
                 self.half_curl(block, block.modes[3:], block.modes[:3])
             self.history.apply_forces(past, block, t.modes)
@@ -71,7 +71,7 @@ class InertialPart(GridPart):
     def felt(self) -> np.ndarray:
         """The present velocity (k, 3) at the nodes that were placed, on process 0."""
         self.transform.modes[:3] = self.history.now
-        return self.nodes.felt(3, self.transform.backward(3))
+        return self.nodes.felt(3, self.transform.backward(3, self.nodes.touched))
 
     def _largest(self, value: float) -> float:
         return float(max(self._comm.allgather(float(value))))

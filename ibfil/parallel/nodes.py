@@ -28,6 +28,7 @@ class SharedNodes:
         self._counts = np.zeros(comm.size, np.int64)
         self._total = 0
         self.mine = Stencil(np.empty((0, 3), np.int64), np.empty((0, 3, 1)))
+        self.touched = np.empty(0, np.int64)  # planes of the grid that any node touches, in order
 
     def place(self, stencil: Stencil | None) -> None:
         """Gives each process the stencils that it needs of all (n nodes), which process 0 has."""
@@ -36,7 +37,9 @@ class SharedNodes:
             self._total, points = len(stencil.base), stencil.weights.shape[2]
             touched = [self._touched(stencil.base[:, 0], points, rank) for rank in range(comm.size)]
             self._order, self._counts = np.concatenate(touched), np.array([len(nodes) for nodes in touched])
-        points = comm.bcast(points)
+            cells = stencil.base[:, :1] + np.arange(points)
+            self.touched = np.unique(cells % self._cells)
+        points, self.touched = comm.bcast((points, self.touched))
         base, weights = (None, None) if stencil is None else (stencil.base, stencil.weights)
         self._counts = comm.bcast(self._counts)
         self.mine = Stencil(self._dealt(base, (3,), np.int64), self._dealt(weights, (3, points), np.float64))

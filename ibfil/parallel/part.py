@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -53,12 +54,10 @@ class GridPart:
         """Velocities at nodes that ``vectors`` (n, 3 v) on them drive, and half the vorticities where v = 2."""
         t, fields = self.transform, 3 * self.vectors
         self.nodes.spread(vectors, fields, t.real)
-        for block in t.blocks(fields):
-            self._solve(block, viscosity, alpha)
-            t.modes[:fields, :, block.j] = block.modes[:, :, 0]
-        return self.nodes.felt(fields, t.backward(fields))
+        u = t.multiply(fields, partial(self._solve, viscosity, alpha), self.nodes.touched)
+        return self.nodes.felt(fields, u)
 
-    def _solve(self, block: Block, viscosity: float, alpha: float) -> None:
+    def _solve(self, viscosity: float, alpha: float, block: Block) -> None:
         """From the modes of forces, and of torques, in the block to those of velocities, and half their curl."""
         kx, ky, _ = self._k
         kz, sx, sy, sz = self._waves

@@ -14,8 +14,8 @@ import sys
 import time
 import traceback
 import weakref
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
 import numpy as np
@@ -64,17 +64,23 @@ class Ranks:
         self._broken = False
 
     def __enter__(self) -> Ranks:
-        global _ours
-        _ours = self
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
-        global _ours
-        _ours = None
         if self._broken:  # the others wait for the rest of a call: they are ended once this process has said why
             atexit.register(self.comm.Abort, 1)
         else:
             self._tell((_STOP, (), ()))
+
+    @contextmanager
+    def sharing(self) -> Iterator[None]:
+        """Within it scenes are assembled for all of them."""
+        global _ours
+        _ours = self
+        try:
+            yield
+        finally:
+            _ours = None
 
     def make(self, part: Callable[..., Any], *told: Any) -> Shared:
         """A part, made by each process with its communicator and what it is told, the same for all."""

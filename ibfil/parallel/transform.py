@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,19 @@ from ..grid.fft import learn, modes_of, plan, useful_threads, wisdom
 from ..grid.fftw import pyfftw
 from ..grid.slab_fft import Block
 from .division import Division
+
+
+class _Cut(NamedTuple):
+    """The planes (k,) of the grid that are transformed; those of this process, as it counts them; what is sent of them.
+
+    ``parts`` are the rows of each process, in what is sent; then numbers to send to, and to receive from, each.
+    """
+
+    planes: np.ndarray
+    mine: list[int]
+    parts: list[np.ndarray]
+    in_planes: list[int]
+    in_rows: list[int]
 
 
 class SharedTransform:
@@ -40,10 +53,8 @@ class SharedTransform:
         self.real = pyfftw.zeros_aligned((fields, mine, ny, nz), dtype=number)
         self.modes = pyfftw.zeros_aligned((fields, nx, own, half), dtype=kind)
         self._sent = pyfftw.zeros_aligned(mine * ny * half, dtype=kind)
-        ends = [mine * half * start for start in self.rows.starts]  # in it: my planes, the rows of each process
-        self._parts = [self._sent[a:b].reshape(mine, -1, half) for a, b in pairwise(ends)]
-        self._in_planes = [mine * half * count for count in self.rows.counts]
-        self._in_rows = [own * half * count for count in self.planes.counts]
+        self._all = self._cut(np.arange(nx))
+        self._last = self._all
 
         self._plane = pyfftw.zeros_aligned((ny, nz), dtype=number)
         self._plane_modes = pyfftw.zeros_aligned((ny, half), dtype=kind)
@@ -65,28 +76,75 @@ class SharedTransform:
             for count, room in ((n, self._room[:n]) for n in {3, len(self._room)})
         }
 
-    def blocks(self, fields: int) -> Iterator[Block]:
+    def _cut(self, planes: np.ndarray) -> _Cut:
+        """The parts that are sent where only these ``planes`` (k,), in order, are looked at, or not zero."""
+        comm, (_, _, own, half) = self._comm, self.modes.shape
+        counts = [int(count) for count in np.diff(np.searchsorted(planes, self.planes.starts))]
+        mine = planes[(planes >= self.planes.starts[comm.rank]) & (planes < self.planes.starts[comm.rank + 1])]
+        ends = [len(mine) * half * start for start in self.rows.starts]  # my planes, the rows of each process
+        pieces = zip(self.rows.counts, pairwise(ends), strict=True)
+        parts = [self._sent[a:b].reshape(len(mine), count, half) for count, (a, b) in pieces]
+        sizes = [len(mine) * half * count for count in self.rows.counts]
+        local = (mine - self.planes.starts[comm.rank]).tolist()
+        return _Cut(planes, local, parts, sizes, [own * half * count for count in counts])
+
+    def _of(self, planes: np.ndarray | None) -> _Cut:
+        """The same; that of the last ones is kept."""
+        if planes is None:
+            return self._all
+        if self._last.planes is not planes:
+            self._last = self._cut(planes)
+        return self._last
+
+    def blocks(self, fields: int, planes: np.ndarray | None = None) -> Iterator[Block]:
         """All modes of this process of the first ``fields`` of ``real``, one row after the other; the room is reused.
 
-        A block's ``j`` counts from the first row of this process.
+        A block's ``j`` counts from the first row of this process. All points beyond ``planes``, where some are given,
+        count as zero.
         """
+        cut, forward = self._of(planes), self._along[fields][0]
         for field in range(fields):
-            self._to_rows(field)
-        forward = self._along[fields][0]
+            self._to_rows(field, cut)
+        room = self._room[:fields]
         for j in range(self.modes.shape[2]):
-            self._room[:fields, :, 0] = self.modes[:fields, :, j]
+            if len(cut.planes) < len(room[0]):
+                room[:] = 0.0
+                room[:, cut.planes, 0] = self.modes[:fields, : len(cut.planes), j]
+            else:
+                room[:, :, 0] = self.modes[:fields, :, j]
             forward.execute()
-            yield Block(self._room[:fields], 0, j)
+            yield Block(room, 0, j)
 
-    def from_blocks(self, fields: int, fill: Callable[[Block], None]) -> np.ndarray:
-        """The first ``fields`` of ``real``, times the cells, of modes that ``fill`` puts into each row's block."""
-        backward = self._along[fields][1]
+    def from_blocks(self, fields: int, fill: Callable[[Block], None], planes: np.ndarray | None = None) -> np.ndarray:
+        """The first ``fields`` of ``real``, times the cells, of modes that ``fill`` puts into each row's block.
+
+        Where ``planes`` are given only those are found, and the others have no meaning.
+        """
+        cut = self._of(planes)
         for j in range(self.modes.shape[2]):
             fill(Block(self._room[:fields], 0, j))
-            backward.execute()
+            self._put_back(fields, j, cut)
+        return self._planes_of(fields, cut)
+
+    def multiply(self, fields: int, symbol: Callable[[Block], None], planes: np.ndarray | None = None) -> np.ndarray:
+        """The first ``fields`` of ``real``, times the cells, after ``symbol`` is applied to each row's block."""
+        cut = self._of(planes)
+        for block in self.blocks(fields, planes):
+            symbol(block)
+            self._put_back(fields, block.j, cut)
+        return self._planes_of(fields, cut)
+
+    def _put_back(self, fields: int, j: int, cut: _Cut) -> None:
+        """The row j of what is sent back, transformed along x, from the modes in the room."""
+        self._along[fields][1].execute()
+        if len(cut.planes) < self._room.shape[1]:
+            self.modes[:fields, : len(cut.planes), j] = self._room[:fields, cut.planes, 0]
+        else:
             self.modes[:fields, :, j] = self._room[:fields, :, 0]
+
+    def _planes_of(self, fields: int, cut: _Cut) -> np.ndarray:
         for field in range(fields):
-            self._to_planes(field)
+            self._to_planes(field, cut)
         return self.real
 
     def forward(self, fields: int, into: np.ndarray | None = None) -> np.ndarray:
@@ -96,30 +154,30 @@ class SharedTransform:
             to[:fields, :, block.j] = block.modes[:, :, 0]
         return to
 
-    def backward(self, fields: int) -> np.ndarray:
-        """``real`` of the first ``fields`` of ``modes``, which are lost, times the number of cells."""
+    def backward(self, fields: int, planes: np.ndarray | None = None) -> np.ndarray:
+        """``real`` of the first ``fields`` of ``modes``, which are lost, times the number of cells; or ``planes``."""
 
         def kept(block: Block) -> None:
             block.modes[:, :, 0] = self.modes[:fields, :, block.j]
 
-        return self.from_blocks(fields, kept)
+        return self.from_blocks(fields, kept, planes)
 
-    def _to_rows(self, field: int) -> None:
+    def _to_rows(self, field: int, cut: _Cut) -> None:
         """From the planes of a field, by FFTs in them, to the rows of its modes."""
         rows = [self.rows.rows(r) for r in range(self._comm.size)]
-        for i, points in enumerate(self.real[field]):
-            self._plane[:] = points
+        for i, plane in enumerate(cut.mine):
+            self._plane[:] = self.real[field, plane]
             self._forth.execute()
-            for part, to in zip(self._parts, rows, strict=True):
+            for part, to in zip(cut.parts, rows, strict=True):
                 part[i] = self._plane_modes[to]
-        self._comm.Alltoallv([self._sent, self._in_planes], [self.modes[field], self._in_rows])
+        self._comm.Alltoallv([self._sent, cut.in_planes], [self.modes[field], cut.in_rows])
 
-    def _to_planes(self, field: int) -> None:
+    def _to_planes(self, field: int, cut: _Cut) -> None:
         """The way back."""
         rows = [self.rows.rows(r) for r in range(self._comm.size)]
-        self._comm.Alltoallv([self.modes[field], self._in_rows], [self._sent, self._in_planes])
-        for i, points in enumerate(self.real[field]):
-            for part, come in zip(self._parts, rows, strict=True):
+        self._comm.Alltoallv([self.modes[field], cut.in_rows], [self._sent, cut.in_planes])
+        for i, plane in enumerate(cut.mine):
+            for part, come in zip(cut.parts, rows, strict=True):
                 self._plane_modes[come] = part[i]
             self._back.execute()
-            points[:] = self._plane
+            self.real[field, plane] = self._plane
