@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.body_meshes import extents
+from ...analysis.body_meshes import drawn, extents, grain
 from ...analysis.meshes import box_of, polylines, rods_of
 from ...analysis.run import Run, open_run
 from ...assembly.fluids.models import fluid_model
@@ -116,7 +116,7 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
         "counts": [p.shape[1] for p in every],
         "positions": _packed(np.round((places - low) / span * 65535), "<u2"),
         "links": links.shape[1],
-        "linewords": "; ".join(["lines: links"] * bool(run.links) + ["rings: bodies"] * bool(ends)),
+        "linewords": _words(run),
         "linked": _packed(np.round((links - low) / span * 65535), "<u2"),
         "radius": _packed(radii, "<f4"),
         "low": low.tolist(),
@@ -133,11 +133,17 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
 
 
 def _strokes(run: Run, picked: np.ndarray) -> np.ndarray:
-    """The two ends of each line (T, K, 2, 3): of the elements of all links, and three rings about each body."""
+    """The two ends of each line (T, K, 2, 3): of the elements of all links, and three rings about each body.
+
+    Markers of a file are crosses of three short lines.
+    """
     each = [np.stack([np.asarray(c["first"])[picked], np.asarray(c["second"])[picked]], 2) for c in run.links.values()]
     turn = np.linspace(0.0, 2 * np.pi, RING + 1)[:, None]
-    for ends, columns in zip(extents(run), _sized(run), strict=True):
+    for ends, columns in zip(extents(run), drawn(run), strict=True):
         centre = np.asarray(columns["position"])[picked, None]
+        if "markers" in columns:
+            each += _crosses(np.asarray(columns["markers"])[picked], columns, picked)
+            continue
         arms = [ends[picked, None, k] - centre for k in (0, 2, 4)]
         for one, other in ((0, 1), (1, 2), (2, 0)):
             ring = centre + np.cos(turn) * arms[one] + np.sin(turn) * arms[other]
@@ -145,9 +151,17 @@ def _strokes(run: Run, picked: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros((len(picked), 0, 2, 3)), *each], axis=1)
 
 
-def _sized(run: Run) -> list[Mapping[str, Any]]:
-    """The columns of bodies that have a size."""
-    return [columns for name, columns in run.bodies.items() if any(run.case.bodies[name].shape.semi_axes)]
+def _words(run: Run) -> str:
+    """The legend of lines."""
+    clouds = [columns for columns in drawn(run) if "markers" in columns]
+    found = {"lines: links": run.links, "rings: bodies": len(drawn(run)) > len(clouds), "crosses: markers": clouds}
+    return "; ".join(words for words, there in found.items() if there)
+
+
+def _crosses(markers: np.ndarray, columns: Mapping[str, Any], picked: np.ndarray) -> list[np.ndarray]:
+    """Lines (T, k, 2, 3) along each axis of a body through its markers (T, k, 3)."""
+    arms = [grain(markers[0]) * np.asarray(columns[key])[picked, None] for key in ("e1", "e2", "e3")]
+    return [np.stack([markers - arm, markers + arm], axis=2) for arm in arms]
 
 
 def _packed(values: np.ndarray, kind: str) -> str:
