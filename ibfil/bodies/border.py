@@ -62,7 +62,8 @@ def bordered(
     loads, by_each = _outside(carried, first, each)
     matrix = own.by_each + np.diag(carried.drag) / tau - carried.slope
     matrix = matrix + carried.balance @ by_each.reshape(p, -1).T
-    short = carried.want - carried.balance @ loads.ravel() - own.force - carried.drag * rate
+    with np.errstate(invalid="ignore"):  # of a load that has no value, which the step tells
+        short = carried.want - carried.balance @ loads.ravel() - own.force - carried.drag * rate
     if supports is not None:
         matrix, short = matrix + supports.by_each, short - supports.now
     found = carried.by[:, None] == held.at

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..case.bodies.shapes import Joint
+from ..case.consistency.bodies import ends_in
 
 if TYPE_CHECKING:
     from ..case.bodies.body import Body
@@ -44,12 +45,13 @@ def _of_motor(motor: Motor) -> str:
     return f"torque {motor.stall:g} at rest, none at the rate {motor.free:g}"
 
 
-def of_body(name: str, body: Body) -> str:
+def of_body(case: Case, name: str) -> str:
     """Its shape, how it moves, and what pushes it."""
-    terms = [_shape(body)]
-    given = body.given_motion
+    body = case.bodies[name]
+    terms, given = [_shape(body)], body.given_motion
+    hinges = isinstance(body.shape, Joint) and all(end.hinged for _, _, end in ends_in(case, name))
     if given is None:
-        terms.append("free to move and turn")
+        terms.append("free to move, while its rods turn about it" if hinges else "free to move and turn")
     else:
         still = all(part.constant == 0.0 for part in (*given.moves, *given.turns))
         terms.append("held" if still else "moved as given")

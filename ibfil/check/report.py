@@ -92,7 +92,7 @@ def modelled(case: Case) -> list[str]:
             terms.append("standing where its points are given (0.1.0 moved and turned them to position and direction)")
         out.append(f"filament {name}, {f.nodes} nodes{_copies(f)}: " + ", ".join(terms))
     out += [f"link {name}: {link.words}" for name, link in case.links.items()]
-    out += [of_body(name, body) for name, body in case.bodies.items()]
+    out += [of_body(case, name) for name in case.bodies]
     if case.fluid.flow is not None:
         spins = ", and spins those that twist by half its vorticity about the tangent" if case.twists else ""
         out.append(f"a background flow, which moves the nodes{spins}")
@@ -221,7 +221,10 @@ def _steps(simulation: Simulation) -> list[str]:
         lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
     limit = "not with bodies" if case.bodies else "not with mass"
     if not case.heavy and not case.bodies:
-        limit = f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)"
+        most = simulation.explicit_limit()
+        limit = f"stable below dt = {most:.3g} at the start shape, 2/rho(M K)"
+        if not np.isfinite(most):
+            limit = "no limit found: at the start shape no force answers to a move, or a force or the flow has no value"
     return [
         *lines,
         f"explicit scheme: {limit}",

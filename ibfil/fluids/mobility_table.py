@@ -25,6 +25,7 @@ from ..linalg.vectors import NOT_NEGATIVE
 ALL = 2**62  # a reach that no pair is beyond
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SIX = (0,) * 6
+IN_ANY_ORDER = {"contract", "reassoc", "nsz"}  # sums may be taken so: what numba calls fastmath
 
 
 def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
@@ -92,13 +93,14 @@ def plane_sums(table, corner, c, acc, unit, points):
                 acc[k] += c[1, j] * line
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+@njit(cache=True, inline="always")
 def sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points):
     """All components of the octant for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
 
     ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` and ``points`` tuples of k and of P
     entries: what the compiler knows of k and P. Returns the signs (3,) of the mirrored axes, for components beyond the
-    sixth. Arrays are indexed in full in every loop: a view of one costs more than the arithmetic.
+    sixth. Arrays are indexed in full in every loop, and the whole is in line: a view of one costs more than the
+    arithmetic, and a call, which counts references to all of them, a seventh of it.
     """
     p, parts = len(points), len(unit)
     corner = (0, 0, 0)
@@ -142,7 +144,7 @@ def sum_any(octant, base, weights, centres, a, b, c, acc, sums, unit, points):
     return sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=IN_ANY_ORDER)
 def _pairs(octant, base, weights, slip, rows, columns, points):
     terms, centres = 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
@@ -159,7 +161,7 @@ def _pairs(octant, base, weights, slip, rows, columns, points):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=IN_ANY_ORDER)
 def _mobility(octant, base, weights, slip, points):
     n, terms, centres = weights.shape[0], 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.body_meshes import body_surfaces
+from ..analysis.meshes import PLAIN, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,13 +23,13 @@ LEGEND = "axes of bodies: first red, second green, third blue"
 CORNERS = 60  # of an outline
 
 
-def add_bodies(show: Callable[..., object], run: Run, output: int) -> None:
+def add_bodies(show: Callable[..., object], run: Run, output: int, view: View = PLAIN) -> None:
     """Adds the bodies of an output to a picture by ``show``, in place of those of another one."""
     import pyvista
 
     if not run.bodies:
         return
-    whole = pyvista.wrap(body_surfaces(run, run.snapshot(output)))
+    whole = pyvista.wrap(body_surfaces(run, run.snapshot(output), view))
     surface = whole.copy()
     surface.lines = np.zeros(0, int)
     show(surface, color=SURFACE, smooth_shading=True, specular=0.2, name="bodies")

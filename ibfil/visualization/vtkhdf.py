@@ -57,10 +57,11 @@ def write_vtkhdf(
         _write(paths[0], lambda file: _write_meshes(file, ((s.time, polylines(s, rods, box, view)) for s in shown())))
         if opened.links:
             paths.append(_place(folder, run, "links"))
-            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, link_lines(s)) for s in shown())))
+            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, link_lines(s, box, view)) for s in shown())))
         if opened.bodies:
             paths.append(_place(folder, run, "bodies"))
-            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, body_surfaces(opened, s)) for s in shown())))
+            meshes = ((s.time, body_surfaces(opened, s, view)) for s in shown())
+            _write(paths[-1], lambda file: _write_meshes(file, meshes))
         if opened.grid is not None and len(opened.grid.time):
             paths.append(_place(folder, run, "grid"))
             _write(paths[-1], lambda file: _write_fields(file, opened))

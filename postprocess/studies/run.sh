@@ -53,6 +53,13 @@ study swimmer_uncertainty uncertainty swimmer_stokes --meant
 study flailing_tune tune flailing --for growth=5% --for frequency=1%
 study swimmer_tune tune swimmer_stokes --for speed=2%
 
+# What a head costs a sperm cell, by its radius. heads.py draws them together.
+study head_none compare "$here/head.toml" body=absent filament.tail.start=absent --fluids rft,matched,free,stokes
+study head_0.075 compare "$here/head.toml" parameters.head=0.075 --fluids rft,matched,free,stokes
+study head_0.1 compare "$here/head.toml" parameters.head=0.1 --fluids rft,matched,free,stokes
+study head_0.15 compare "$here/head.toml" parameters.head=0.15 --fluids rft,matched,free,stokes
+study head_0.2 compare "$here/head.toml" parameters.head=0.2 --fluids rft,matched,free,stokes
+
 # Flutter of a clamped rod under a follower force: the threshold in resistive-force theory, and on grids in free space and in a box,
 # of rods 18, 27 and 36 hydrodynamic radii long. flutter.py draws them together.
 study flutter_rft modes "$here/flutter.toml" fluid.model=rft fluid.box=absent fluid.thickness=absent --critical parameters.F0=24,40

@@ -12,6 +12,7 @@ from ibfil.bodies.resistance import ellipsoid
 from ibfil.errors import CaseError
 from ibfil.fluids.shells.calibration import fitted
 from ibfil.simulation.simulation import Simulation
+from ibfil.visualization.web.page import write_page
 
 SPHERE = '{ kind = "sphere", radius = 0.2 }'
 CLOUD = '{ kind = "file", path = "markers.csv" }'
@@ -76,7 +77,7 @@ def test_the_markers_of_a_sphere_are_the_sphere(tmp_path, monkeypatch, fluid):
 
 
 def test_they_drag_as_the_sphere_wherever_they_are_seen_from(tmp_path):
-    """Shifted and turned in the file, and put back by position and axes: the same places, the same motion."""
+    """Shifted and turned in the file, and put back by position and axes: the same places, and motion to Newton's tolerance."""
     first, second = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, 1.0])
     axes, shift = np.column_stack([first, second, np.cross(first, second)]), np.array([0.03, -0.02, 0.05])
     points = (shell() + shift) @ axes
@@ -88,7 +89,7 @@ def test_they_drag_as_the_sphere_wherever_they_are_seen_from(tmp_path):
     here, there = (sim.snapshot().bodies["head"] for sim in (one, other))
     np.testing.assert_allclose(there.markers, here.markers, atol=1e-8)
     np.testing.assert_allclose(there.spin, here.spin, atol=1e-5 * np.linalg.norm(here.spin))
-    np.testing.assert_allclose(there.force, here.force, atol=1e-5 * np.abs(here.force).max())
+    np.testing.assert_allclose(there.force, here.force, atol=1e-4 * np.abs(here.force).max())
 
 
 def test_in_rft_they_have_the_resistance_that_is_given(tmp_path):
@@ -128,6 +129,9 @@ def test_a_run_records_them_and_draws_them(tmp_path):
         assert surface.GetNumberOfLines() == 3
         assert np.ptp(extents(run)[0][0], axis=0) == pytest.approx(np.ptp(shell(), axis=0), rel=1e-9)
         assert run.to_xarray()["head_markers"].dims == ("time", "head_marker", "xyz")
+    page = write_page(tmp_path / "cell.h5", tmp_path / "cell.html", log=str).read_text()
+    assert '"linewords": "crosses: markers"' in page
+    assert '"links": 150,' in page
 
 
 FAULTS = {

@@ -20,7 +20,7 @@ from copy import copy
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.lapack import dpotrf, dtrtrs
 
 from ...bodies.border import Done, Own, bordered, frozen, supported
 from ...errors import StepFailed
@@ -30,6 +30,8 @@ from ...linalg.normal_numbers import Draw
 from ...linalg.stiffness import Stiffness, no_pairs
 from ..base import Solution
 from .shell import Shells
+
+FEW = 300  # unknowns of nodes, whose matrix is factored again in less time than an iteration with an old one takes
 
 
 class MarkersTooClose(StepFailed):
@@ -50,13 +52,12 @@ class Rigid:
         at: slice | np.ndarray = slice(rods, None)
         if components > 3:  # markers do not spin
             at = np.arange(rods, len(matrix)).reshape(-1, components)[:, :3].ravel()
-        shell, across = matrix[at][:, at], matrix[at, :rods]
-        try:
-            self._lower = cholesky(shell, lower=True, check_finite=False)
-        except np.linalg.LinAlgError:
-            raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0) from None
-        drifting = np.zeros((len(levers), 1)) if drift is None else drift[:, None]
-        half = self._solved(np.concatenate([across, levers, drifting], axis=1))
+        self._lower, fault = dpotrf(matrix[at][:, at].T, lower=1, clean=0)  # symmetric: LAPACK takes rows for columns
+        if fault:
+            raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0)
+        right = np.empty((rods + levers.shape[1] + 1, len(levers)))
+        right[:rods], right[rods:-1], right[-1] = matrix[:rods, at], levers.T, 0.0 if drift is None else drift
+        half = self._solved(right.T)
         self._half, self._own = half[:, :rods], half[:, rods:-1]
         self.rods = matrix[:rods, :rods] - self._half.T @ self._half
         self.by_bodies = self._half.T @ self._own  # how rods move with q: T^T B
@@ -77,9 +78,7 @@ class Rigid:
 
     def _solved(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """L^-1 right, or L^-T, of M_mm = L L^T."""
-        out: np.ndarray = solve_triangular(
-            self._lower, right, trans=int(transposed), lower=True, overwrite_b=True, check_finite=False
-        )
+        out: np.ndarray = dtrtrs(self._lower, right, lower=1, trans=int(transposed), overwrite_b=1)[0]
         return out
 
     def pushes(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
@@ -123,8 +122,6 @@ class WithShells:
     Dense: all m unknowns of a node in one system, turns that do not go through the fluid by their own drag (n,).
     """
 
-    keeps = True
-
     def __init__(
         self, rigid: Rigid, shells: Shells, flow: np.ndarray | None, spin_drag: np.ndarray | None, tau: float
     ) -> None:
@@ -132,9 +129,10 @@ class WithShells:
         self._rigid, self._shells, self._flow, self.tau = rigid, shells, flow, tau
         self._c = rigid.components
         self._mobility = rigid.rods if spin_drag is None else _with_turns(rigid.rods, spin_drag)
+        self.keeps = len(self._mobility) > FEW
         self._factors: tuple[Stiffness, Factors] | None = None  # and the stiffness they are of
         self._each: _Each | None = None
-        self._forces: np.ndarray | None = None  # of markers (3 k,), by the last correction
+        self._last: tuple[Rigid, np.ndarray, np.ndarray] | None = None  # rates of q, and what nodes do
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """Not of scenes with bodies, which have no thermal forces."""
@@ -162,11 +160,9 @@ class WithShells:
         if coming is not None:
             flow, rigid = coming[:n] / self.tau, self._rigid.drifting(coming[n:, :3].ravel() / self.tau)
         at, value = _inside(held, carried, y, n * m)
-        known = np.zeros((1, n * m))
-        known[0, at] = value
         base = self._base(rigid, target[:n], flow, moved) - y[:n]
-        first = self._corrections(stiffness, at, known, force[None, :n], base[None])
-        return self._whole(held, (rigid, first, self._by_each(stiffness, at, carried)), y, moved)
+        parts = self._first_and_each(stiffness, (at, value), (force[:n], base), carried)
+        return self._whole(held, (rigid, *parts), y, moved)
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements without stiffness: by that of none."""
@@ -178,20 +174,37 @@ class WithShells:
 
     def marker_forces(self) -> np.ndarray:
         """The forces of markers on the fluid (k, 3), by the last correction."""
-        assert self._forces is not None
-        return self._forces.reshape(-1, 3)
+        assert self._last is not None
+        rigid, rate, felt = self._last
+        return rigid.pushes(rate, felt).reshape(-1, 3)
 
-    def _by_each(self, stiffness: Stiffness, at: np.ndarray, carried: Carried) -> _Nodes:
-        """The corrections by each unknown of bodies, those of before where they are of the same linear step."""
-        if self._each is None or not self._each.serves(stiffness, carried):
-            n, m, p = carried.columns.shape
-            known = np.zeros((p, n * m))
-            known[:, at[len(at) - len(carried.at) :]] = carried.lever.T
-            base = np.zeros((p, n, m))
-            base[:, :, : self._c] = self._rigid.by_bodies.T.reshape(p, n, self._c)
-            found = self._corrections(stiffness, at, known, carried.columns.transpose(2, 0, 1), base)
-            self._each = _Each((stiffness, carried.lever, carried.columns), found)
-        return self._each.nodes
+    def _first_and_each(
+        self,
+        stiffness: Stiffness,
+        moves: tuple[np.ndarray, np.ndarray],
+        pushed: tuple[np.ndarray, np.ndarray],
+        carried: Carried,
+    ) -> tuple[_Nodes, _Nodes]:
+        """The corrections while bodies stay, and by each of their unknowns, as before in the same linear step.
+
+        ``moves``: the unknowns (l,) that are held or carried, and how far these are off; ``pushed``: forces on nodes
+        and their moves without any (n, m).
+        """
+        (at, value), (n, m, p) = moves, carried.columns.shape
+        again = self._each is not None and self._each.serves(stiffness, carried)
+        known = np.zeros((1 if again else 1 + p, n * m))
+        known[0, at] = value
+        if self._each is not None and again:
+            return self._corrections(stiffness, at, known, *(part[None] for part in pushed)), self._each.nodes
+        known[1:, at[len(at) - len(carried.at) :]] = carried.lever.T
+        forces, base = np.empty((1 + p, n, m)), np.zeros((1 + p, n, m))
+        forces[0], base[0] = pushed
+        forces[1:] = carried.columns.transpose(2, 0, 1)
+        base[1:, :, : self._c] = self._rigid.by_bodies.T.reshape(p, n, self._c)
+        found = self._corrections(stiffness, at, known, forces, base)
+        first, each = _Nodes(*(part[:1] for part in found)), _Nodes(*(part[1:] for part in found))
+        self._each = _Each((stiffness, carried.lever, carried.columns), each)
+        return first, each
 
     def _corrections(
         self, stiffness: Stiffness, at: np.ndarray, known: np.ndarray, pushes: np.ndarray, base: np.ndarray
@@ -241,9 +254,9 @@ class WithShells:
             at = carried.clamps.nodes
             supports = supported(carried.clamps, one.reactions[0, at], each.reactions[:, at], first, by)
         dq, reacted = bordered(held, carried, (first, by, own, supports), y, moved / tau, tau)
-        d, force, support = (a[0] + np.tensordot(dq, b, 1) for a, b in zip(one, each, strict=True))
+        d, force, support = (a[0] + (dq @ b.reshape(p, -1)).reshape(a[0].shape) for a, b in zip(one, each, strict=True))
         rate, felt = (moved + dq) / tau, force[:, :c].ravel()
-        self._forces = rigid.pushes(rate, felt)
+        self._last = rigid, rate, felt
         rows = (self._shells.in_rows(q, y.shape) for q in (dq, rigid.forces(rate, felt), reacted))
         move, felt, reaction = (np.concatenate(both) for both in zip((d, force, support), rows, strict=True))
         return Solution(move, felt, reaction)
@@ -266,7 +279,7 @@ def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tu
 
 def _times(stiffness: Stiffness, x: np.ndarray, m: int) -> np.ndarray:
     """K times each of x (k, m n)."""
-    return np.array([stiffness.times(one.reshape(-1, m)).ravel() for one in x]).reshape(x.shape)
+    return stiffness.times_each(x.reshape(len(x), -1, m)).reshape(x.shape)
 
 
 def _with_turns(mobility: np.ndarray, spin_drag: np.ndarray) -> np.ndarray:

@@ -114,6 +114,8 @@ class StokesWithBodies(Memoryless):
 
     def refuse(self, r: np.ndarray, e3: np.ndarray) -> None:
         """Raises BodyInWall where a marker is too low."""
+        if not np.isfinite(self.lowest):
+            return
         height = float(np.min(self.immersed.shells.places(r, e3)[:, 2], initial=np.inf))
         if height < self.lowest:
             raise BodyInWall(f"a body went into the wall: a marker at z = {height:.3g}, allowed {self.lowest:.3g}", 0)
