@@ -77,7 +77,7 @@ def test_the_markers_of_a_sphere_are_the_sphere(tmp_path, monkeypatch, fluid):
 
 
 def test_they_drag_as_the_sphere_wherever_they_are_seen_from(tmp_path):
-    """Shifted and turned in the file, and put back by position and axes: the same places, and motion to Newton's tolerance."""
+    """Shifted and turned in the file, and put back: the same places, and motion to Newton's tolerance."""
     first, second = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, 1.0])
     axes, shift = np.column_stack([first, second, np.cross(first, second)]), np.array([0.03, -0.02, 0.05])
     points = (shell() + shift) @ axes
