@@ -95,7 +95,7 @@ def _turned(points: np.ndarray, body: Body, nodes: np.ndarray) -> np.ndarray:
 
 
 def _spaced(name: str, apart: np.ndarray) -> list[str]:
-    """What is told of markers of a file that lock against each other, or between which fluid passes."""
+    """Lines on markers of a file that lock against each other, or between which fluid passes."""
     dense, loose = int((apart < CLOSE).sum()), int((apart > WIDE).sum())
     out, key = [], f"body.{name}.shape.path"
     if dense:
