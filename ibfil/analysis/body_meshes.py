@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,26 @@ if TYPE_CHECKING:
     from ..io.reader import RunFile
     from ..io.snapshots import BodySnapshot, Snapshot
 
+Columns = Mapping[str, Mapping[str, Any]]
+
 ROUND, UP = 32, 16  # facets of an ellipsoid about its third axis, and along it
 BEYOND = 1.35  # of a semi-axis: how far its line goes
+GRAIN = 0.4  # of the distance of neighbours: how large a marker is drawn
+_OCTAHEDRON = np.concatenate([np.eye(3), -np.eye(3)])
+_SIDES = np.array([[i, j, k] for i in (0, 3) for j in (1, 4) for k in (2, 5)])
+
+
+def drawn(case: Case, bodies: Columns) -> list[tuple[Mapping[str, Any], tuple[float, float, float]]]:
+    """The columns over time of those ``bodies`` that are to be seen, with their semi-axes: all but joints."""
+    each = [(columns, case.bodies[name].shape.semi_axes) for name, columns in bodies.items()]
+    return [(columns, size) for columns, size in each if any(size) or "markers" in columns]
+
+
+def grain(markers: np.ndarray) -> float:
+    """How far a marker (k, 3) is drawn to reach."""
+    apart = np.linalg.norm(markers[:, None] - markers, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    return GRAIN * float(np.median(apart.min(axis=1)))
 
 
 def extents(run: RunFile) -> list[np.ndarray]:
@@ -25,14 +43,19 @@ def extents(run: RunFile) -> list[np.ndarray]:
     return ends_of_axes(run.case, run.bodies)
 
 
-def ends_of_axes(case: Case, bodies: Mapping[str, Mapping[str, Any]]) -> list[np.ndarray]:
-    """The same of ``bodies`` as columns (T, 3) of position, e1, e2, e3 by name."""
+def ends_of_axes(case: Case, bodies: Columns) -> list[np.ndarray]:
+    """The same of ``bodies`` as columns (T, 3) of position, e1, e2, e3 by name, and markers (T, k, 3) of a file."""
     out = []
-    for name, columns in bodies.items():
-        size = case.bodies[name].shape.semi_axes
-        if any(size):
-            centre = np.asarray(columns["position"])
-            arms = [a * np.asarray(columns[key]) for a, key in zip(size, ("e1", "e2", "e3"), strict=True)]
+    for columns, size in drawn(case, bodies):
+        centre, axes = np.asarray(columns["position"]), [np.asarray(columns[key]) for key in ("e1", "e2", "e3")]
+        if "markers" in columns:
+            first = np.asarray(columns["markers"])[0] - centre[0]
+            reach = [(float(np.max(first @ e[0])), float(np.min(first @ e[0]))) for e in axes]
+            out.append(
+                np.stack([centre + far * e for e, both in zip(axes, reach, strict=True) for far in both], axis=1)
+            )
+        else:
+            arms = [a * e for a, e in zip(size, axes, strict=True)]
             out.append(np.stack([centre + sign * arm for arm in arms for sign in (1, -1)], axis=1))
     return out
 
@@ -40,6 +63,7 @@ def ends_of_axes(case: Case, bodies: Mapping[str, Mapping[str, Any]]) -> list[np
 def body_surfaces(run: RunFile, snapshot: Snapshot, view: View = PLAIN) -> vtkDataSet:
     """All bodies at one time as vtkPolyData: ellipsoids and, as lines from the centre, their axes.
 
+    Markers of a file are small octahedra.
     At points: ``velocity`` of the body there, the number of the ``body``, and ``axis``: 1, 2, 3 on the lines, else 0.
     Wrapped ones are whole, with their centre in the periodic box; images carry which box they are in (``image``).
     Joints have no size, and are left out. Raises ValueError where ``view`` asks for a box and there is none.
@@ -48,54 +72,78 @@ def body_surfaces(run: RunFile, snapshot: Snapshot, view: View = PLAIN) -> vtkDa
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkPolyData
 
-    sizes = [np.array(run.case.bodies[name].shape.semi_axes) for name in snapshot.bodies]
-    every = zip(snapshot.bodies.values(), sizes, strict=True)
-    solid = [(k, body, size) for k, (body, size) in enumerate(every) if size.any()]
-    each, shifts = len(_SPHERE) + 6, view.shifts
-    away = np.array([_arms(body, size) for _, body, size in solid]).reshape(-1, each, 3)
-    centre, velocity, spin = (
-        np.array([getattr(body, key) for _, body, _ in solid]).reshape(-1, 1, 3)
-        for key in ("position", "velocity", "spin")
-    )
-    box = known_box(box_of(run), view)
-    places = view.brought(centre, box) + away + (shifts * box)[:, None, None]
-    count = len(shifts) * len(solid)
+    solids = [found for k, name in enumerate(snapshot.bodies) for found in _solid(run, k, name, snapshot.bodies[name])]
+    shifts, sizes, box = view.shifts, [len(solid.away) for solid in solids], known_box(box_of(run), view)
+    centres = view.brought(np.array([solid.body.position for solid in solids]).reshape(-1, 1, 3), box)
+    first = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    whole = _joined([centre + solid.away for centre, solid in zip(centres, solids, strict=True)], (0, 3))
+    places = whole + (shifts * box)[:, None]
+    velocity = _joined([solid.body.velocity + np.cross(solid.body.spin, solid.away) for solid in solids], (0, 3))
     arrays = {
-        "velocity": np.broadcast_to(velocity + np.cross(spin, away), places.shape).reshape(-1, 3),
-        "body": np.tile(np.repeat([k for k, _, _ in solid], each), len(shifts)).astype(np.int32),
-        "axis": np.tile(_WHICH, count),
+        "velocity": np.tile(velocity, (len(shifts), 1)),
+        "body": np.tile(np.repeat([solid.number for solid in solids], sizes), len(shifts)).astype(np.int32),
+        "axis": np.tile(_joined([solid.axis for solid in solids], (0,)), len(shifts)).astype(np.int32),
     }
     if view.images:
-        arrays["image"] = np.repeat(shifts, len(solid) * each, axis=0).astype(np.int32)
+        arrays["image"] = np.repeat(shifts, first[-1], axis=0).astype(np.int32)
     data, points = vtkPolyData(), vtkPoints()
     points.SetData(numpy_to_vtk(np.ascontiguousarray(places.reshape(-1, 3)), deep=True))
     data.SetPoints(points)
-    data.SetPolys(_cells(_FACES, each, count))
-    data.SetLines(_cells(len(_SPHERE) + np.arange(6).reshape(3, 2), each, count))
+    starts = [first[-1] * k + at for k in range(len(shifts)) for at in first[:-1]]
+    data.SetPolys(_cells([solid.faces for solid in solids] * len(shifts), starts))
+    data.SetLines(_cells([solid.lines for solid in solids] * len(shifts), starts))
     for key, values in arrays.items():
         add_array(data.GetPointData(), key, values)
     add_array(data.GetFieldData(), "TimeValue", np.array([snapshot.time]))
     return data
 
 
-def _cells(corners: np.ndarray, each: int, count: int) -> vtkCellArray:
-    """The cells of a body by the numbers (f, k) of its points, for ``count`` bodies of ``each`` points."""
+def _joined(parts: list[np.ndarray], none: tuple[int, ...]) -> np.ndarray:
+    return np.concatenate([np.zeros(none), *parts])
+
+
+def _cells(each: list[np.ndarray], starts: list[np.int64]) -> vtkCellArray:
+    """The cells of bodies by the numbers (f, k) of their own points, which begin at ``starts``."""
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonDataModel import vtkCellArray
 
-    whole = (corners + each * np.arange(count)[:, None, None]).reshape(-1).astype(np.int64)
-    offsets = np.arange(0, len(whole) + 1, corners.shape[1], dtype=np.int64)
+    none = [np.zeros(0, np.int64)]
+    whole = np.concatenate(none + [(at + cells).ravel() for cells, at in zip(each, starts, strict=True)])
+    corners = np.concatenate(none + [np.full(len(cells), cells.shape[1]) for cells in each])
+    offsets = np.concatenate([[0], np.cumsum(corners)]).astype(np.int64)
     cells = vtkCellArray()
     cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(whole, deep=True))
     return cells
 
 
-def _arms(body: BodySnapshot, size: np.ndarray) -> np.ndarray:
-    """The points of a body (k, 3) from its centre: of its surface, then of its axes."""
-    axes = np.stack([body.e1, body.e2, body.e3])
+class _Solid(NamedTuple):
+    """A body to be drawn: its points (k, 3) from its centre, facets and lines by these, the axis that each is on."""
+
+    number: int
+    body: BodySnapshot
+    away: np.ndarray
+    faces: np.ndarray
+    lines: np.ndarray
+    axis: np.ndarray
+
+
+def _solid(run: RunFile, number: int, name: str, body: BodySnapshot) -> list[_Solid]:
+    """A body as an ellipsoid, or its markers, and its axes; a joint is none."""
+    size, axes = np.array(run.case.bodies[name].shape.semi_axes), np.stack([body.e1, body.e2, body.e3])
+    if body.markers is not None:
+        from_centre = np.asarray(body.markers) - body.position
+        size = np.abs(from_centre @ axes.T).max(axis=0)
+        surface = (from_centre[:, None] + grain(from_centre) * _OCTAHEDRON @ axes).reshape(-1, 3)
+        faces = (6 * np.arange(len(from_centre))[:, None, None] + _SIDES).reshape(-1, 3)
+    elif size.any():
+        surface, faces = _SPHERE * size @ axes, _FACES
+    else:
+        return []
     tips = BEYOND * size[:, None] * axes
     lines = np.stack([np.zeros_like(tips), tips], axis=1).reshape(6, 3)
-    return np.concatenate([_SPHERE * size @ axes, lines])
+    which = np.concatenate([np.zeros(len(surface)), np.repeat([1, 2, 3], 2)])
+    at = len(surface) + np.arange(6).reshape(3, 2)
+    return [_Solid(number, body, np.concatenate([surface, lines]), faces, at, which)]
 
 
 def _sphere() -> tuple[np.ndarray, np.ndarray]:
@@ -110,4 +158,3 @@ def _sphere() -> tuple[np.ndarray, np.ndarray]:
 
 
 _SPHERE, _FACES = _sphere()
-_WHICH = np.concatenate([np.zeros(len(_SPHERE)), np.repeat([1, 2, 3], 2)]).astype(np.int32)  # axis each point is on

@@ -169,6 +169,8 @@ class Run(RunFile):
             for name, columns in found.items():
                 for key, column in columns.items():
                     path, dims = f"{group}/{name}/{key}", ("time", "xyz")[: len(column.shape)]
+                    if len(column.shape) > 2:
+                        dims = ("time", f"{name}_marker", "xyz")
                     about = {"units": self.units(path), "description": self.description(path)}
                     out[f"{name}_{before}{key}"] = (dims, np.asarray(column), about)
         return out

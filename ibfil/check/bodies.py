@@ -68,6 +68,8 @@ def _shape(body: Body) -> str:
     """Its size."""
     if isinstance(body.shape, Joint):
         return "a joint without size or drag"
+    if body.shape.file is not None:
+        return f"the markers of {body.shape.file}"
     first, *others = body.shape.semi_axes
     if others == [first, first]:
         return f"a sphere of radius {first:g}"

@@ -52,6 +52,7 @@ _BODY = {
     "torque": ("force length", "torque of the body itself on the fluid, about its centre"),
     "reaction": ("force", "force that holds or moves the body, where its motion is given"),
     "reaction_torque": ("force length", "torque that holds or moves the body, about its centre"),
+    "markers": ("length", "positions of its markers, where they are of a file"),
 }
 _MOTOR = {
     "angle": ("1", "angle by which the rod has turned against the body since the start, rad"),

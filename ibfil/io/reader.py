@@ -102,7 +102,10 @@ class RunFile:
 
     @cached_property
     def bodies(self) -> dict[str, dict[str, Column]]:
-        """Body -> name -> Column (T, 3): position, e1, e2, e3, velocity, spin, force, torque, and reactions if held."""
+        """Body -> name -> Column (T, 3): position, e1, e2, e3, velocity, spin, force, torque, and reactions if held.
+
+        Markers (T, k, 3) where these are of a file.
+        """
         return {name: self._columns(f"bodies/{name}") for name in self._file.get("bodies", {})}
 
     @cached_property

@@ -32,6 +32,7 @@ def bodies(rods: RodStack, now: SolvedState) -> dict[str, BodySnapshot]:
             now.force[turn, :3] * rows.length,
             now.reaction[centre, :3].copy() if given else None,
             now.reaction[turn, :3] * rows.length if given else None,
+            None if body.cloud is None else poses.centre[b] + body.cloud @ poses.axes[b].T,
         )
     return out
 

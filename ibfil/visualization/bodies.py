@@ -57,16 +57,33 @@ def add_outlines(
 
     for name, columns in run.bodies.items():
         size = np.array(run.case.bodies[name].shape.semi_axes)
-        if not size.any():
+        if "markers" in columns:
+            clouds = np.asarray(columns["markers"])[picked] - (np.ndim(origin) and np.asarray(origin)[:, None])
+            rings = [hull(cloud) for cloud in clouds[:, :, list(plane)]]
+        elif size.any():
+            centre = np.asarray(columns["position"])[picked] - origin
+            turned = np.stack([np.asarray(columns[key])[picked] for key in ("e1", "e2", "e3")], axis=1)
+            seen = (centre[:, list(plane)], size[:, None] * turned[:, :, list(plane)])
+            rings = [middle + outline(arms) for middle, arms in zip(*seen, strict=True)]
+        else:
             continue
-        centre = np.asarray(columns["position"])[picked] - origin
-        turned = np.stack([np.asarray(columns[key])[picked] for key in ("e1", "e2", "e3")], axis=1)
-        seen = (centre[:, list(plane)], size[:, None] * turned[:, :, list(plane)])
-        rings = [middle + outline(arms) for middle, arms in zip(*seen, strict=True)]
         lines = LineCollection(rings, cmap=colours, linewidths=1.2)
         lines.set_array(np.asarray(run.time)[picked])
         lines.set_clim(*span)
         axes.add_collection(lines)
+
+
+def hull(points: np.ndarray) -> np.ndarray:
+    """The outline (k, 2) of points in a plane, closed; of those along a line this line."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        corners = ConvexHull(points).vertices
+    except QhullError:
+        along = points @ np.linalg.svd(points - points.mean(axis=0))[2][0]
+        corners = np.array([along.argmin(), along.argmax()])
+    out: np.ndarray = points[np.append(corners, corners[0])]
+    return out
 
 
 def outline(arms: np.ndarray) -> np.ndarray:

@@ -124,7 +124,7 @@ def test_many_swimmers_take_krylov_by_themselves_and_check_says_why():
     assert sim.method == "krylov"
     assert [len(one.bodies) for one in apart(sim.case, sim.rods)] == [1] * 64
     told = sim.model.fluid_model.solved(sim.rods)[0]
-    assert "in 64 swimmers or parts that nothing joins: each solved for by itself" in told
+    assert "in 64 swimmers or unjoined parts: each solved for by itself" in told
     assert sim.model.seconds["table"] == np.inf
     assert simulated(TWO, BOX).method == "table"
 

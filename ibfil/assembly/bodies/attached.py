@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...errors import CaseError
+from .clouds import size
 
 if TYPE_CHECKING:
     from ...bodies.body import Body
@@ -47,11 +48,14 @@ def check_places(case: Case, rods: RodStack, ends: Sequence[InBody], bodies: Seq
         body, table = bodies[names.index(at.end.body)], case.bodies[at.end.body]
         filament = rods.names[next(k for k, where in enumerate(rods.nodes) if where == at.where)]
         key = f"{case.file}: filament.{filament}.{'finish' if at.finish else 'start'}.body"
-        fault = _misplaced(at, body, np.array(table.shape.semi_axes), rods.start, case.filaments[filament].length)
+        if body.cloud is None:
+            fault = _misplaced(at, body, np.array(table.shape.semi_axes), rods.start, case.filaments[filament].length)
+        else:
+            fault = _away(at, body, body.cloud, rods.start)
         faults += [f"{key}: {fault.format(name=at.end.body)}"] if fault else []
-    for name, table in case.bodies.items():
+    for name in names:
         own = [at for at in ends if at.end.body == name]
-        if not any(table.shape.semi_axes) and _in_line(own, rods.start):
+        if not size(case, name).any() and _in_line(own, rods.start):
             found = "found clamped filaments without twisting that leave a joint along one line, and may turn about it"
             faults.append(f"{case.file}: body.{name}: {found}; allowed: twisting, or hinged ends")
     if faults:
@@ -74,6 +78,15 @@ def _misplaced(at: InBody, body: Body, size: np.ndarray, start: Configuration, l
     deepest = -min(float(_outside(point, size)) for point in place)
     if deepest > INSIDE * segment * (1 + 1e-9):
         return f"found nodes up to {deepest:.3g} inside {{name}}; allowed: at most half a segment, {0.5 * segment:.3g}"
+    return ""
+
+
+def _away(at: InBody, body: Body, cloud: np.ndarray, start: Configuration) -> str:
+    """The fault of one end in a cloud of markers, as above: it may be as far off as the cloud is large."""
+    end = (start.r[at.node] - body.centre) @ body.axes
+    away, allowed = float(np.linalg.norm(cloud - end, axis=1).min()), float(np.ptp(cloud, axis=0).max())
+    if away > allowed:
+        return f"found an end {away:.3g} off the markers of {{name}}; allowed: at most its size, {allowed:.3g}"
     return ""
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import costs
 from ..bodies import swimmers
+from ..bodies.clouds import size
 from . import shells
 from .base import FluidModel
 
@@ -70,12 +71,12 @@ class ImmersedBodiesModel(FluidModel):
     @cached_property
     def markers(self) -> list[int]:
         """How many markers each of the bodies has."""
-        fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.bodies)
-        return [0 if found is None else len(found.markers) for found in fits]
+        kernel, h = self.case.fluid.kernel, self.space.spacing
+        return [len(shells.markers(self.case, name, kernel, h)) for name in self.case.bodies]
 
     def reached(self, rods: RodStack) -> np.ndarray:
         """Places (k, 3) at the start between which all that pushes is: nodes, and bodies to their largest semi-axes."""
-        r, sizes = [rods.start.r], [max(body.shape.semi_axes) for body in self.case.bodies.values()]
+        r, sizes = [rods.start.r], [float(size(self.case, name).max()) for name in self.case.bodies]
         if rods.bodies:
             centres = rods.start.r[rods.count : rods.count + 2 * len(sizes) : 2]
             r += [centres + sign * np.array(sizes)[:, None] for sign in (-1.0, 1.0)]
@@ -110,7 +111,8 @@ class ImmersedBodiesModel(FluidModel):
             "table": "all in one dense system",
             "krylov": "each solved for by itself, what they give each other by GMRES on the FFT",
         }.get(method, "all in one dense system, which GMRES on the FFT confirms")
+        parts = "swimmer" if len(alone) == 1 else "swimmers or unjoined parts"
         return [
-            f"{nodes} nodes and {markers} markers of bodies, in {len(alone)} swimmers or parts that nothing joins: "
+            f"{nodes} nodes and {markers} markers of bodies, in {len(alone)} {parts}: "
             f"{how}; dense matrices of all take {size:.2g} GiB"
         ]

@@ -103,6 +103,8 @@ def _body(key: str, body: Body, ends: list[End]) -> Iterator[Fault]:
         yield Fault(f"{key}.axes", shown(body.axes), "two directions at an angle to each other")
     if body.own_axes and body.force is None and body.torque is None:
         yield Fault(f"{key}.frame", '"body" and neither force nor torque', "only with one of them")
+    if body.shape.file is not None and body.meets_rotation:
+        yield Fault(f"{key}.fit", "a fit of markers of a file, which are as they are", "no fit", (f"{key}.shape",))
     if not isinstance(body.shape, Joint):
         return
     if body.resistance is not None:
@@ -121,6 +123,12 @@ def _scene(case: Scene) -> Iterator[Fault]:
     """Fluids, schemes and rods that bodies are not modelled with."""
     key = f"body.{next(iter(case.bodies))}"
     yield from _fluid(case, key)
+    for name, body in case.bodies.items():
+        if body.shape.file is not None and body.resistance is None and not case.fluid.on_grid:
+            own, found = f"body.{name}.resistance", f"nothing, of markers of a file in {case.fluid.model}"
+            yield Fault(
+                own, found, "translation and rotation, or a fluid on a grid", ("fluid.model", f"body.{name}.shape")
+            )
     if case.thermal is not None:
         yield Fault(key, "a body with [thermal]", "no bodies with [thermal]", ("thermal",))
     if case.time.scheme != "implicit":

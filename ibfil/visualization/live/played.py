@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ...io.snapshots import Snapshot
 
 COLOURED = ("tension", "curvature", "speed")
+_OF_BODIES = ("position", "e1", "e2", "e3", "markers")
 
 
 class Played:
@@ -90,7 +91,7 @@ class Played:
         """All that stays while it runs (visualization/web/constants.py), and the case's controls."""
         snapshot = self.simulation.snapshot()
         places = [filament.position[None] for filament in snapshot.filaments.values()]
-        bodies = ends_of_axes(self.case, _columns(snapshot.bodies, ("position", "e1", "e2", "e3")))
+        bodies = ends_of_axes(self.case, _columns(snapshot.bodies, _OF_BODIES))
         whole = np.concatenate([p.reshape(-1, 3) for p in (*places, *bodies)])
         radii = np.concatenate([rod.radius for rod in self._rods.values()])
         units = {self._observed.recorded(name): one for name, one in self._observed.observables.items()}
@@ -121,7 +122,7 @@ class Played:
     def _strokes(self, snapshot: Snapshot) -> np.ndarray:
         """Links and rings of bodies as strokes (K, 2, 3)."""
         links = _columns(snapshot.links, ("first", "second"))
-        found: np.ndarray = strokes(self.case, links, _columns(snapshot.bodies, ("position", "e1", "e2", "e3")))[0]
+        found: np.ndarray = strokes(self.case, links, _columns(snapshot.bodies, _OF_BODIES))[0]
         return found
 
     def _colours(self, name: str) -> dict[str, Any]:
@@ -136,8 +137,12 @@ class Played:
 
 
 def _columns(parts: Any, keys: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
-    """Parts of a snapshot as columns over the one time that it has."""
-    return {name: {key: np.asarray(getattr(one, key))[None] for key in keys} for name, one in parts.items()}
+    """Parts of a snapshot as columns over the one time that it has, without those that a part lacks."""
+    found = {name: {key: getattr(one, key) for key in keys} for name, one in parts.items()}
+    return {
+        name: {key: np.asarray(values)[None] for key, values in one.items() if values is not None}
+        for name, one in found.items()
+    }
 
 
 def _plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...analysis.body_meshes import ends_of_axes
+from ...analysis.body_meshes import Columns, drawn, ends_of_axes, grain
 from ...assembly.fluids.models import fluid_model
 from ...screen import printable
 from ..camera import turned, upwards, viewpoint
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 LEVELS = 256  # of colours
 RING = 24  # strokes of a ring about a body
-
-Columns = Mapping[str, Mapping[str, Any]]
 
 
 def filled(page: str, title: str, data: str, *scripts: str) -> str:
@@ -55,7 +53,7 @@ def constants(
         "casetext": case.text,
         "timewords": "time #" + ("" if units.time == "1" else f" {units.time}"),
         "lengthunit": "" if units.length == "1" else f" {units.length}",
-        "linewords": "; ".join(["lines: links"] * bool(case.links) + ["rings: bodies"] * bool(sized(case))),
+        "linewords": _words(case),
         "radius": packed(radii, "<f4"),
         "centre": look.centre.tolist(),
         "reach": max(0.5 * float(np.linalg.norm(high - low)) + float(radii.max()), 1e-300),
@@ -66,15 +64,30 @@ def constants(
     }
 
 
+def _words(case: Case) -> str:
+    """The legend of strokes."""
+    shapes = [body.shape for body in case.bodies.values()]
+    found = {
+        "lines: links": case.links,
+        "rings: bodies": any(any(shape.semi_axes) for shape in shapes),
+        "crosses: markers": any(shape.file for shape in shapes),
+    }
+    return "; ".join(words for words, there in found.items() if there)
+
+
 def strokes(case: Case, links: Columns, bodies: Columns) -> np.ndarray:
     """The two ends of each stroke (T, K, 2, 3): of the elements of all links, and three rings about each body.
 
     Columns are arrays over times: ``first`` and ``second`` (T, K, 3) of links, ``position``, ``e1`` ... (T, 3).
+    Markers (T, k, 3) of a file are crosses of three short strokes.
     """
     each = [np.stack([np.asarray(c["first"]), np.asarray(c["second"])], axis=2) for c in links.values()]
     turn = np.linspace(0.0, 2 * np.pi, RING + 1)[:, None]
-    for ends, name in zip(ends_of_axes(case, bodies), sized(case), strict=True):
-        centre = np.asarray(bodies[name]["position"])[:, None]
+    for ends, (columns, _) in zip(ends_of_axes(case, bodies), drawn(case, bodies), strict=True):
+        if "markers" in columns:
+            each += _crosses(columns)
+            continue
+        centre = np.asarray(columns["position"])[:, None]
         arms = [ends[:, None, k] - centre for k in (0, 2, 4)]
         for one, other in ((0, 1), (1, 2), (2, 0)):
             ring = centre + np.cos(turn) * arms[one] + np.sin(turn) * arms[other]
@@ -82,9 +95,11 @@ def strokes(case: Case, links: Columns, bodies: Columns) -> np.ndarray:
     return np.concatenate(each, axis=1) if each else np.zeros((1, 0, 2, 3))
 
 
-def sized(case: Case) -> list[str]:
-    """The names of bodies that have a size."""
-    return [name for name, body in case.bodies.items() if any(body.shape.semi_axes)]
+def _crosses(columns: Mapping[str, Any]) -> list[np.ndarray]:
+    """Strokes (T, k, 2, 3) along each axis of a body through its markers."""
+    markers = np.asarray(columns["markers"])
+    arms = [grain(markers[0]) * np.asarray(columns[key])[:, None] for key in ("e1", "e2", "e3")]
+    return [np.stack([markers - arm, markers + arm], axis=2) for arm in arms]
 
 
 def packed(values: np.ndarray, kind: str) -> str:

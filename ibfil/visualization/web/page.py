@@ -103,7 +103,7 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
 
 def _strokes(run: Run, picked: np.ndarray) -> np.ndarray:
     """The strokes (T, K, 2, 3) of the outputs that are picked."""
-    kept = {"first", "second", "position", "e1", "e2", "e3"}
+    kept = {"first", "second", "position", "e1", "e2", "e3", "markers"}
     links, bodies = (
         {name: {key: np.asarray(columns[key])[picked] for key in kept & set(columns)} for name, columns in part.items()}
         for part in (run.links, run.bodies)
