@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 
 VTKHDF = Kind("a file of VTKHDF", lambda path, head: head.startswith(b"\x89HDF") and b"VTKHDF" in head)
+BLOCK = 2**24  # bytes gathered before they are written
 _KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # of cells, in the order of the offsets
 
 
@@ -85,16 +86,33 @@ def _root(file: h5py.File, kind: str) -> h5py.Group:
     return root
 
 
-def _append(group: h5py.Group, name: str, rows: np.ndarray) -> None:
-    """More rows of a dataset, which is made for the first ones."""
-    if name not in group:
-        chunk = max(1, min(len(rows), 2**18 // max(rows[:1].nbytes, 1)))
-        chunks = (chunk, *rows.shape[1:])
-        group.create_dataset(name, data=rows, maxshape=(None, *rows.shape[1:]), chunks=chunks)
-        return
-    dataset = group[name]
-    dataset.resize(len(dataset) + len(rows), axis=0)
-    dataset[len(dataset) - len(rows) :] = rows
+class _Rows:
+    """Rows of datasets in a group, gathered and written in blocks: HDF5 takes as long for one row as for many."""
+
+    def __init__(self, root: h5py.Group) -> None:
+        self._root, self._kept = root, 0
+        self._rows: dict[str, list[np.ndarray]] = {}
+
+    def add(self, name: str, rows: np.ndarray) -> None:
+        """More rows (n, ...) of the dataset ``name``, which is made for the first ones."""
+        self._rows.setdefault(name, []).append(rows.copy())
+        self._kept += rows.nbytes
+        if self._kept > BLOCK:
+            self.write()
+
+    def write(self) -> None:
+        """Write all that is gathered."""
+        for name, gathered in self._rows.items():
+            rows = np.concatenate(gathered)
+            if name in self._root:
+                dataset = self._root[name]
+                dataset.resize(len(dataset) + len(rows), axis=0)
+                dataset[len(dataset) - len(rows) :] = rows
+                continue
+            chunk = max(1, min(len(rows), 2**18 // max(rows[:1].nbytes, 1)))
+            shape = {"maxshape": (None, *rows.shape[1:]), "chunks": (chunk, *rows.shape[1:])}
+            self._root.create_dataset(name, data=rows, **shape)
+        self._rows, self._kept = {}, 0
 
 
 def _cells(mesh: vtkDataSet, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -111,50 +129,48 @@ def _write_meshes(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) -
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     root = _root(file, "PolyData")
-    steps, data = root.create_group("Steps"), root.create_group("PointData")
-    begins = steps.create_group("PointDataOffsets")
-    for kind in _KINDS:
-        root.create_group(kind)
+    rows = _Rows(root)
     last: list[np.ndarray] = []
     part, points, cells, ids = -1, 0, np.zeros(4, np.int64), np.zeros(4, np.int64)
     new_cells, new_ids = np.zeros(4, np.int64), np.zeros(4, np.int64)
-    for count, (time, mesh) in enumerate(meshes, 1):
+    for time, mesh in meshes:
         topology = [_cells(mesh, kind) for kind in _KINDS]
         arrays = [array for pair in topology for array in pair]
         if not last or not all(np.array_equal(one, other) for one, other in zip(arrays, last, strict=True)):
             part, cells, ids, last = part + 1, cells + new_cells, ids + new_ids, [array.copy() for array in arrays]
             new_cells = np.array([len(offsets) - 1 for offsets, _ in topology])
             new_ids = np.array([len(each) for _, each in topology])
-            _append_topology(root, mesh.GetNumberOfPoints(), topology)
+            _append_topology(rows, mesh.GetNumberOfPoints(), topology)
         values = mesh.GetPointData()
         for i in range(values.GetNumberOfArrays()):
             array = values.GetArray(i)
-            _append(data, array.GetName(), vtk_to_numpy(array))
-            _append(begins, array.GetName(), np.array([points]))
-        _append(root, "Points", vtk_to_numpy(mesh.GetPoints().GetData()))
-        _append_step(steps, time, part, points, cells, ids)
-        steps.attrs["NSteps"] = count
+            rows.add(f"PointData/{array.GetName()}", vtk_to_numpy(array))
+            rows.add(f"Steps/PointDataOffsets/{array.GetName()}", np.array([points]))
+        rows.add("Points", vtk_to_numpy(mesh.GetPoints().GetData()))
+        _append_step(rows, time, part, points, cells, ids)
         points += mesh.GetNumberOfPoints()
+    rows.write()
+    root["Steps"].attrs["NSteps"] = len(root["Steps/Values"])
 
 
-def _append_topology(root: h5py.Group, points: int, topology: list[tuple[np.ndarray, np.ndarray]]) -> None:
+def _append_topology(rows: _Rows, points: int, topology: list[tuple[np.ndarray, np.ndarray]]) -> None:
     """A part: its cells of each kind."""
-    _append(root, "NumberOfPoints", np.array([points]))
+    rows.add("NumberOfPoints", np.array([points]))
     for kind, (offsets, each) in zip(_KINDS, topology, strict=True):
-        _append(root[kind], "Offsets", offsets)
-        _append(root[kind], "NumberOfCells", np.array([len(offsets) - 1]))
-        _append(root[kind], "NumberOfConnectivityIds", np.array([len(each)]))
-        _append(root[kind], "Connectivity", each)
+        rows.add(f"{kind}/Offsets", offsets)
+        rows.add(f"{kind}/NumberOfCells", np.array([len(offsets) - 1]))
+        rows.add(f"{kind}/NumberOfConnectivityIds", np.array([len(each)]))
+        rows.add(f"{kind}/Connectivity", each)
 
 
-def _append_step(steps: h5py.Group, time: float, part: int, points: int, cells: np.ndarray, ids: np.ndarray) -> None:
+def _append_step(rows: _Rows, time: float, part: int, points: int, cells: np.ndarray, ids: np.ndarray) -> None:
     """A time: the part that it shows, and where its points begin, and its cells of each kind (4,)."""
-    _append(steps, "Values", np.array([time]))
-    _append(steps, "NumberOfParts", np.array([1]))
-    _append(steps, "PartOffsets", np.array([part]))
-    _append(steps, "PointOffsets", np.array([points]))
+    rows.add("Steps/Values", np.array([time]))
+    rows.add("Steps/NumberOfParts", np.array([1]))
+    rows.add("Steps/PartOffsets", np.array([part]))
+    rows.add("Steps/PointOffsets", np.array([points]))
     for name, begin in (("CellOffsets", cells), ("ConnectivityIdOffsets", ids)):
-        _append(steps, name, begin[None])
+        rows.add(f"Steps/{name}", begin[None])
 
 
 def _write_fields(file: h5py.File, run: RunFile) -> None:
@@ -164,8 +180,7 @@ def _write_fields(file: h5py.File, run: RunFile) -> None:
     grid = run.grid
     assert grid is not None
     root = _root(file, "ImageData")
-    steps, data = root.create_group("Steps"), root.create_group("PointData")
-    begins = steps.create_group("PointDataOffsets")
+    rows = _Rows(root)
     for number, time in enumerate(np.asarray(grid.time)):
         image = field_data(run, number)
         if not number:
@@ -176,7 +191,8 @@ def _write_fields(file: h5py.File, run: RunFile) -> None:
         for i in range(arrays.GetNumberOfArrays()):
             array = arrays.GetArray(i)
             values = vtk_to_numpy(array)
-            _append(data, array.GetName(), values.reshape(1, *shape, *values.shape[1:]))
-            _append(begins, array.GetName(), np.array([number]))
-        _append(steps, "Values", np.array([float(time)]))
-        steps.attrs["NSteps"] = number + 1
+            rows.add(f"PointData/{array.GetName()}", values.reshape(1, *shape, *values.shape[1:]))
+            rows.add(f"Steps/PointDataOffsets/{array.GetName()}", np.array([number]))
+        rows.add("Steps/Values", np.array([float(time)]))
+    rows.write()
+    root["Steps"].attrs["NSteps"] = len(grid.time)
