@@ -88,10 +88,10 @@ def box_of(run: RunFile) -> np.ndarray | None:
 
 
 def directors(position: np.ndarray, e1: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """e2 and e3 (N, 3) of a filament: e3 is its tangent by central differences, made normal to e1 (N, 3)."""
-    tangent = np.gradient(position, s, axis=0, edge_order=2)
-    tangent = tangent - np.sum(tangent * e1, axis=1, keepdims=True) * e1
-    e3 = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
+    """e2 and e3 (..., N, 3) of a filament: e3 is its tangent by central differences, made normal to e1 (..., N, 3)."""
+    tangent = np.gradient(position, s, axis=-2, edge_order=2)
+    tangent = tangent - np.sum(tangent * e1, axis=-1, keepdims=True) * e1
+    e3 = tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
     return np.cross(e3, e1), e3
 
 
@@ -131,7 +131,7 @@ def polylines(
         filament = snapshot.filaments[name]
         pieces = wrapped(filament.position, -0.5 * box, box) if view.wrap else unwrapped(len(rod.s))
         own = pieces.take(filament.position) - pieces.image * box
-        shown = _on(pieces, _node_arrays(filament, rod))
+        shown = _on(pieces, node_arrays(filament, rod))
         shown["filament"] = np.full(len(own), number, np.int32)
         for shift in view.shifts:
             points.append(own + shift * box)
@@ -222,13 +222,9 @@ def _poly_data(
     return data
 
 
-def _node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
-    """The arrays of one filament as they appear in ParaView, all with N rows.
-
-    Tension lives on segments: a node shows the mean of its two, an end its only one.
-    """
+def node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
+    """The arrays of one filament as they appear in ParaView, all with N rows; over several times (T, N, ...)."""
     e2, e3 = directors(filament.position, filament.e1, rod.s)
-    tension = filament.tension
     return {
         "velocity": filament.velocity,
         "force": filament.force,
@@ -237,10 +233,15 @@ def _node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
         "e1": filament.e1,
         "e2": e2,
         "e3": e3,
-        "tension": 0.5 * (np.append(tension[0], tension) + np.append(tension, tension[-1])),
+        "tension": at_nodes(filament.tension),
         "tube_radius": rod.radius,
         "arclength": rod.s,
     }
+
+
+def at_nodes(tension: np.ndarray) -> np.ndarray:
+    """The tension (..., N) of nodes from that of segments (..., N - 1): the mean of its two, of an end its only one."""
+    return 0.5 * (np.append(tension[..., :1], tension, axis=-1) + np.append(tension, tension[..., -1:], axis=-1))
 
 
 def image(fields: dict[str, np.ndarray], origin: np.ndarray, spacing: np.ndarray, time: float) -> vtkDataSet:

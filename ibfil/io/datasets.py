@@ -29,6 +29,7 @@ _FILAMENT = {
     "torque": ("force length", "twist torque of each node on the fluid, along the tangent"),
     "spin": ("1/time", "rate at which the first material director turns about the tangent, along it"),
 }
+ALONG_FRAME = ("moment", "strain")  # of a filament: components along e1, e2, e3, and not along x, y, z
 _LINK = {
     "first": ("length", "points on the first of what the link joins"),
     "second": ("length", "points on the second"),

@@ -34,6 +34,11 @@ class Check:
     source: str
     note: str = ""
 
+    def __repr__(self) -> str:
+        found = np.array2string(np.asarray(self.found), precision=6)
+        held = "passed" if self.passed else "failed"
+        return f"<{held}: {self.observe} = {found}, expected {self.expected}{'; ' * bool(self.note)}{self.note}>"
+
     def line(self) -> str:
         """One line for the user."""
         found = f"{self.found:.6g}" if isinstance(self.found, float) else str(self.found)

@@ -29,6 +29,11 @@ class Summary:
     error: Value | None = None
     doubt: str = ""
 
+    def __repr__(self) -> str:
+        error = "" if self.error is None else f" +- {np.array2string(np.asarray(self.error), precision=2)}"
+        said = [text for text in (self.note, self.quality, self.doubt) if text]
+        return f"<{'; '.join([np.array2string(np.asarray(self.value), precision=6) + error, *said])}>"
+
 
 class ObservableSet:
     """The observables of a run, and what they have seen."""

@@ -15,6 +15,7 @@ from helpers.runs import run
 import ibfil
 from ibfil.case.reading import differences
 from ibfil.case.toml import load
+from ibfil.observables.observers import Summary
 from ibfil.running.progress import Progress
 
 
@@ -102,7 +103,9 @@ def test_a_notebook_is_shown_lines_and_tables(tmp_path):
     for shown, word in ((result.case, "a &lt;b&gt;"), (result, "<td>moved</td>")):
         assert word in shown._repr_html_()
         assert "<b>" not in shown._repr_html_()
+    assert repr(Summary(0.25, "seen until 1", error=0.1)) == "<0.25 +- 0.1; seen until 1>"
     with ibfil.open(path) as opened:
+        assert repr(opened.summaries["moved"]).startswith("<")
         assert "moved" in opened._repr_html_()
         assert "<b>" not in opened._repr_html_()
         assert opened.plot().png.startswith(b"\x89PNG")
