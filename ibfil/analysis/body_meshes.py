@@ -20,9 +20,9 @@ BEYOND = 1.35  # of a semi-axis: how far its line goes
 
 def extents(run: RunFile) -> list[np.ndarray]:
     """The ends of the axes (T, 6, 3) of each body of a run that has a size: what a picture has to have in it."""
-    out = []
+    out, each = [], run.case.each_body
     for name, columns in run.bodies.items():
-        size = run.case.bodies[name].shape.semi_axes
+        size = each[name].shape.semi_axes
         if any(size):
             centre = np.asarray(columns["position"])
             arms = [a * np.asarray(columns[key]) for a, key in zip(size, ("e1", "e2", "e3"), strict=True)]
@@ -41,7 +41,8 @@ def body_surfaces(run: RunFile, snapshot: Snapshot, view: View = PLAIN) -> vtkDa
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkPolyData
 
-    sizes = [np.array(run.case.bodies[name].shape.semi_axes) for name in snapshot.bodies]
+    tables = run.case.each_body
+    sizes = [np.array(tables[name].shape.semi_axes) for name in snapshot.bodies]
     every = zip(snapshot.bodies.values(), sizes, strict=True)
     solid = [(k, body, size) for k, (body, size) in enumerate(every) if size.any()]
     each, shifts = len(_SPHERE) + 6, view.shifts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -22,6 +22,18 @@ if TYPE_CHECKING:
 
 
 TOGETHER = 500  # nodes of linked filaments that a preconditioner takes as one block
+
+
+class Copied(NamedTuple):
+    """Where a copy goes: it is turned (3, 3) ``about`` a point (3,), which then goes to ``point`` (3,)."""
+
+    turn: np.ndarray
+    about: np.ndarray
+    point: np.ndarray
+
+    def place(self, r: np.ndarray) -> np.ndarray:
+        """Places (.., 3) of the filament, in its copy."""
+        return (r - self.about) @ self.turn.T + self.point
 
 
 @dataclass(frozen=True)
@@ -43,6 +55,7 @@ class RodStack:
     links: tuple[Link, ...] = ()
     bodies: tuple[str, ...] = ()
     motors: tuple[str, ...] = ()
+    copied: tuple[Copied | None, ...] = ()  # where copies went, of each filament
 
     @property
     def count(self) -> int:

@@ -36,8 +36,8 @@ def with_bodies(case: Case, rods: RodStack) -> RodStack:
 
 def _system(case: Case, rods: RodStack) -> RodsWithBodies:
     """The system of the rods and the bodies."""
-    begin, names, ends = rods.start, list(case.bodies), attached_ends(rods)
-    bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.bodies.items()]
+    begin, names, ends = rods.start, list(case.each_body), attached_ends(rods)
+    bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.each_body.items()]
     check_places(case, rods, ends, bodies)
     motors: list[Motor] = []
     driven, attachments = [], []
@@ -73,6 +73,9 @@ def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> B
     y = np.array(table.axes[1]) - (np.array(table.axes[1]) @ x) * x
     y /= np.linalg.norm(y)
     axes = np.column_stack([x, y, np.cross(x, y)])
+    copied = ends[0].copied if ends else None
+    if copied is not None:
+        axes = copied.turn @ axes
     given = table.given_motion
     turns = None if given is None else triple(given.turns, "t")
     if not any(table.shape.semi_axes) and all(at.end.hinged for at in ends):
@@ -91,7 +94,8 @@ def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> B
 def _centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration) -> np.ndarray:
     """The centre (3,): as given, or such that the first end is on the surface, the centre behind its tangent."""
     if table.position is not None or not ends:
-        return np.array(table.position or ORIGIN)
+        place = np.array(table.position or ORIGIN)
+        return place if not ends or ends[0].copied is None else ends[0].copied.place(place)
     first, size = ends[0], np.array(table.shape.semi_axes)
     out = begin.e3[first.node] * (-1.0 if first.finish else 1.0)  # from the body into the rod
     if not size.any():

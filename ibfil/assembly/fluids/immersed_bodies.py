@@ -70,12 +70,12 @@ class ImmersedBodiesModel(FluidModel):
     @cached_property
     def markers(self) -> list[int]:
         """How many markers each of the bodies has."""
-        fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.bodies)
+        fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.each_body)
         return [0 if found is None else len(found.markers) for found in fits]
 
     def reached(self, rods: RodStack) -> np.ndarray:
         """Places (k, 3) at the start between which all that pushes is: nodes, and bodies to their largest semi-axes."""
-        r, sizes = [rods.start.r], [max(body.shape.semi_axes) for body in self.case.bodies.values()]
+        r, sizes = [rods.start.r], [max(body.shape.semi_axes) for body in self.case.each_body.values()]
         if rods.bodies:
             centres = rods.start.r[rods.count : rods.count + 2 * len(sizes) : 2]
             r += [centres + sign * np.array(sizes)[:, None] for sign in (-1.0, 1.0)]

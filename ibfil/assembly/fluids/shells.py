@@ -28,7 +28,7 @@ def fit(case: Case, name: str, kernel: str, h: float) -> Fit | None:
     """The shell of a body in units of the spacing h; None of a joint. Raises CaseError where it is too small."""
     from ...fluids.shells import calibration
 
-    body = case.bodies[name]
+    body = case.bodies[name] if name in case.bodies else case.each_body[name]
     a, b, c = (size / h for size in body.shape.semi_axes)
     if not a:
         return None
@@ -46,7 +46,7 @@ def shells(case: Case, rods: RodStack, kernel: str, h: float) -> Shells:
 
     rows, nodes = rods.with_bodies.rows, rods.nodes_at_start.r
     poses, own = rows.start(), []
-    for b, (name, body) in enumerate(case.bodies.items()):
+    for b, (name, body) in enumerate(case.each_body.items()):
         found = fit(case, name, kernel, h)
         points = np.zeros((0, 3)) if found is None else h * found.markers
         own.append(_turned(points, body, (nodes - poses.centre[b]) @ poses.axes[b]))
@@ -61,7 +61,7 @@ def refuse_below(case: Case, rods: RodStack, kernel: str, h: float, lowest: floa
     """Raises CaseError for bodies whose markers are below a height at the start."""
     start, faults = rods.start, []
     own = shells(case, rods, kernel, h)
-    for name, cloud in zip(case.bodies, own.clouds(start.r, start.e3), strict=True):
+    for name, cloud in zip(case.each_body, own.clouds(start.r, start.e3), strict=True):
         height = float(np.min(cloud[:, 2], initial=np.inf))
         if height < lowest:
             found = f"found markers at z = {height:.3g}, in the wall or too near"
@@ -90,7 +90,7 @@ def _distance(cloud: np.ndarray, others: np.ndarray) -> float:
 
 def _in_the_way(case: Case, rods: RodStack, placed: list[np.ndarray], h: float) -> Iterator[str]:
     """Bodies whose markers are too close to nodes, or to those of another body."""
-    names, nodes = list(case.bodies), rods.nodes_at_start.r
+    names, nodes = list(case.each_body), rods.nodes_at_start.r
     for b, (name, cloud) in enumerate(zip(names, placed, strict=True)):
         for filament, where in zip(rods.names, rods.nodes, strict=True):
             away = _distance(cloud, nodes[where]) / h
@@ -134,7 +134,7 @@ def warnings(case: Case, kernel: str, h: float, box: np.ndarray | None, dense: b
         found = fit(case, name, kernel, h)
         if found is None:
             continue
-        count += len(found.markers)
+        count += len(found.markers) * sum(own is body for own in case.each_body.values())
         least, longest = min(body.shape.semi_axes), max(body.shape.semi_axes)
         if least < SMALL * h:
             out.append(

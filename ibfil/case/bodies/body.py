@@ -39,7 +39,8 @@ class Body(Table):
     resistance: Resistance | None = Field(None, description="rft: its own, instead of that of its shape")
     position: Vector | None = Field(
         None,
-        description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod",
+        description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod; "
+        "a copy of it goes with the copy of its filament",
     )
     axes: Annotated[tuple[Vector, Vector], Listed(2)] = Field(
         ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), description="its first two axes at t = 0, in the lab"

@@ -147,7 +147,8 @@ def _strokes(run: Run, picked: np.ndarray) -> np.ndarray:
 
 def _sized(run: Run) -> list[Mapping[str, Any]]:
     """The columns of bodies that have a size."""
-    return [columns for name, columns in run.bodies.items() if any(run.case.bodies[name].shape.semi_axes)]
+    each = run.case.each_body
+    return [columns for name, columns in run.bodies.items() if any(each[name].shape.semi_axes)]
 
 
 def _packed(values: np.ndarray, kind: str) -> str:
