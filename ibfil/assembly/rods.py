@@ -221,11 +221,8 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     start = system.start(r, e1)
     for part in system.remembering:
         part.start(start)
-    tables = tuple(p.table for p in placed)
-    copied = tuple(p.copied for p in placed)
-    out = RodStack(
-        names, tables, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined), copied=copied
-    )
+    known = names, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined)
+    out = RodStack(*known, tables=tuple(p.table for p in placed), copied=tuple(p.copied for p in placed))
     if not case.bodies:
         return out
     from .bodies.system import with_bodies

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -44,7 +44,6 @@ class RodStack:
     """
 
     names: tuple[str, ...]
-    tables: tuple[str, ...]  # the names that the case gives them: of copies one
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
     ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
@@ -55,7 +54,8 @@ class RodStack:
     links: tuple[Link, ...] = ()
     bodies: tuple[str, ...] = ()
     motors: tuple[str, ...] = ()
-    copied: tuple[Copied | None, ...] = ()  # where copies went, of each filament
+    tables: tuple[str, ...] = field(kw_only=True)  # the names that the case gives them: of copies one
+    copied: tuple[Copied | None, ...] = field(kw_only=True)  # where copies went, of each filament
 
     @property
     def count(self) -> int:
