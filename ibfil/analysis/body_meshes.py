@@ -27,7 +27,8 @@ _SIDES = np.array([[i, j, k] for i in (0, 3) for j in (1, 4) for k in (2, 5)])
 
 def drawn(case: Case, bodies: Columns) -> list[tuple[Mapping[str, Any], tuple[float, float, float]]]:
     """The columns over time of those ``bodies`` that are to be seen, with their semi-axes: all but joints."""
-    each = [(columns, case.bodies[name].shape.semi_axes) for name, columns in bodies.items()]
+    tables = case.each_body
+    each = [(columns, tables[name].shape.semi_axes) for name, columns in bodies.items()]
     return [(columns, size) for columns, size in each if any(size) or "markers" in columns]
 
 
@@ -72,7 +73,9 @@ def body_surfaces(run: RunFile, snapshot: Snapshot, view: View = PLAIN) -> vtkDa
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkPolyData
 
-    solids = [found for k, name in enumerate(snapshot.bodies) for found in _solid(run, k, name, snapshot.bodies[name])]
+    tables = run.case.each_body
+    shapes = {name: np.array(tables[name].shape.semi_axes) for name in snapshot.bodies}
+    solids = [one for k, (name, body) in enumerate(snapshot.bodies.items()) for one in _solid(k, body, shapes[name])]
     shifts, sizes, box = view.shifts, [len(solid.away) for solid in solids], known_box(box_of(run), view)
     centres = view.brought(np.array([solid.body.position for solid in solids]).reshape(-1, 1, 3), box)
     first = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
@@ -127,9 +130,9 @@ class _Solid(NamedTuple):
     axis: np.ndarray
 
 
-def _solid(run: RunFile, number: int, name: str, body: BodySnapshot) -> list[_Solid]:
-    """A body as an ellipsoid, or its markers, and its axes; a joint is none."""
-    size, axes = np.array(run.case.bodies[name].shape.semi_axes), np.stack([body.e1, body.e2, body.e3])
+def _solid(number: int, body: BodySnapshot, size: np.ndarray) -> list[_Solid]:
+    """A body of semi-axes ``size`` as an ellipsoid, or its markers, and its axes; a joint is none."""
+    axes = np.stack([body.e1, body.e2, body.e3])
     if body.markers is not None:
         from_centre = np.asarray(body.markers) - body.position
         size = np.abs(from_centre @ axes.T).max(axis=0)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field
 
 from .bodies.body import Body
+from .copies import copy_names
 from .filament import Filament
 from .fluid import Contact, Fluid
 from .link import Link
@@ -142,12 +143,19 @@ class Scene(Table):
     def joined(self) -> dict[str, tuple[str, ...]]:
         """The names of links, bodies and motors; a motor is called by the end it turns, FILAMENT_start."""
         motors = [
-            f"{name}_{side}"
+            f"{copy}_{side}"
             for name, filament in self.filaments.items()
+            for copy in copy_names(name, filament.copies)
             for side in ("start", "finish")
             if getattr(filament, side).motor is not None
         ]
-        return {"link": tuple(self.links), "body": tuple(self.bodies), "motor": tuple(motors)}
+        return {"link": tuple(self.links), "body": tuple(self.each_body), "motor": tuple(motors)}
+
+    @property
+    def each_body(self) -> dict[str, Body]:
+        """All bodies by name: of those with ends of copies in them one for each, NAME_000, NAME_001 ..."""
+        copies = {end.body: f.copies for f in self.filaments.values() for end in (f.start, f.finish) if end.attached}
+        return {own: body for name, body in self.bodies.items() for own in copy_names(name, copies.get(name))}
 
     @property
     def couples_torque(self) -> bool:

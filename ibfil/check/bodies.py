@@ -47,7 +47,7 @@ def _of_motor(motor: Motor) -> str:
 
 def of_body(case: Case, name: str) -> str:
     """Its shape, how it moves, and what pushes it."""
-    body = case.bodies[name]
+    body, copies = case.bodies[name], sum(own is case.bodies[name] for own in case.each_body.values())
     terms, given = [_shape(body)], body.given_motion
     hinges = isinstance(body.shape, Joint) and all(end.hinged for _, _, end in ends_in(case, name))
     if given is None:
@@ -61,7 +61,7 @@ def of_body(case: Case, name: str) -> str:
         pushed = ["nothing pushes it from outside"]
     outside = "pushes them from outside" if given is None else "pushes them from outside and what holds or moves it"
     total = f"the force and torque of body and rods on the fluid sum to what {outside}, to round-off"
-    return f"body {name}: " + ", ".join([*terms, *pushed]) + f"; {total}"
+    return f"body {name}{f', {copies} copies' if copies > 1 else ''}: " + ", ".join([*terms, *pushed]) + f"; {total}"
 
 
 def _shape(body: Body) -> str:

@@ -55,8 +55,9 @@ def add_outlines(
     """
     from matplotlib.collections import LineCollection
 
+    each = run.case.each_body
     for name, columns in run.bodies.items():
-        size = np.array(run.case.bodies[name].shape.semi_axes)
+        size = np.array(each[name].shape.semi_axes)
         if "markers" in columns:
             clouds = np.asarray(columns["markers"])[picked] - (np.ndim(origin) and np.asarray(origin)[:, None])
             rings = [hull(cloud) for cloud in clouds[:, :, list(plane)]]

@@ -11,15 +11,16 @@ import numpy as np
 from ...errors import CaseError
 
 if TYPE_CHECKING:
+    from ...case.bodies.body import Body
     from ...case.schema import Case
 
 LEAST = 4
 _THIN = 1e-8  # of its length, that a cloud is wide: thinner ones are a line, about which no marker resists
 
 
-def cloud(case: Case, name: str) -> np.ndarray | None:
+def cloud(case: Case, name: str, body: Body) -> np.ndarray | None:
     """The markers (k, 3) of a body in its axes, from its centre, as its file has them; None where it has none."""
-    path = case.bodies[name].shape.file
+    path = body.shape.file
     if path is None:
         return None
     try:
@@ -28,10 +29,10 @@ def cloud(case: Case, name: str) -> np.ndarray | None:
         raise CaseError([f"{case.file}: body.{name}.shape.path: {path}: {error}"]) from None
 
 
-def size(case: Case, name: str) -> np.ndarray:
+def size(case: Case, name: str, body: Body) -> np.ndarray:
     """Half the extents (3,) of a body along its axes: semi-axes, or how far markers are from its centre."""
-    points = cloud(case, name)
-    return np.array(case.bodies[name].shape.semi_axes) if points is None else np.abs(points).max(axis=0)
+    points = cloud(case, name, body)
+    return np.array(body.shape.semi_axes) if points is None else np.abs(points).max(axis=0)
 
 
 def _read(path: Path) -> np.ndarray:

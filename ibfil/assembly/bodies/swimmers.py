@@ -16,14 +16,14 @@ def whole(case: Case, rods: RodStack) -> Swimmer:
     """All of a scene as one."""
     from ...fluids.shells.swimmer import Swimmer
 
-    return Swimmer(rods.ranges, tuple(range(len(case.bodies))), tuple(range(len(rods.motors))))
+    return Swimmer(rods.ranges, tuple(range(len(case.each_body))), tuple(range(len(rods.motors))))
 
 
 def apart(case: Case, rods: RodStack) -> tuple[Swimmer, ...]:
     """Each swimmer of a scene; a filament or a body that nothing is joined to is one by itself."""
     from ...fluids.shells.swimmer import Swimmer
 
-    names, first = list(case.bodies), [where.start for where in rods.nodes]
+    names, first = list(case.each_body), [where.start for where in rods.nodes]
     filaments = len(first)
     group = list(range(filaments + len(names)))
     ends = attached_ends(rods)

@@ -37,8 +37,9 @@ def with_bodies(case: Case, rods: RodStack) -> RodStack:
 
 def _system(case: Case, rods: RodStack) -> RodsWithBodies:
     """The system of the rods and the bodies."""
-    begin, names, ends = rods.start, list(case.bodies), attached_ends(rods)
-    bodies = [_body(case, name, [e for e in ends if e.end.body == name], begin) for name in names]
+    begin, each, ends = rods.start, case.each_body, attached_ends(rods)
+    names = list(each)
+    bodies = [_body(case, name, table, [e for e in ends if e.end.body == name], begin) for name, table in each.items()]
     check_places(case, rods, ends, bodies)
     motors: list[Motor] = []
     driven, attachments = [], []
@@ -68,13 +69,16 @@ def _outside(rods: RodStack, own: Sequence[np.ndarray]) -> list[Load]:
     return [load for load in rods.system.loads if not any(load is other for other in inner)]
 
 
-def _body(case: Case, name: str, ends: Sequence[InBody], begin: Configuration) -> Body:
+def _body(case: Case, name: str, table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> Body:
     """One body as it begins."""
-    table, own = case.bodies[name], size(case, name)
+    own = size(case, name, table)
     x = np.array(table.axes[0]) / np.linalg.norm(table.axes[0])
     y = np.array(table.axes[1]) - (np.array(table.axes[1]) @ x) * x
     y /= np.linalg.norm(y)
     axes = np.column_stack([x, y, np.cross(x, y)])
+    copied = ends[0].copied if ends else None
+    if copied is not None:
+        axes = copied.turn @ axes
     given = table.given_motion
     turns = None if given is None else triple(given.turns, "t")
     if not own.any() and all(at.end.hinged for at in ends):
@@ -87,7 +91,7 @@ def _body(case: Case, name: str, ends: Sequence[InBody], begin: Configuration) -
         _of_time(table.force),
         _of_time(table.torque),
         table.own_axes,
-        cloud(case, name),
+        cloud(case, name, table),
     )
 
 
@@ -96,7 +100,8 @@ def _centre(
 ) -> np.ndarray:
     """The centre (3,): as given, or such that the first end is on the surface, the centre behind its tangent."""
     if table.position is not None or table.shape.file is not None or not ends:
-        return np.array(table.position or ORIGIN)
+        place = np.array(table.position or ORIGIN)
+        return place if not ends or ends[0].copied is None else ends[0].copied.place(place)
     first = ends[0]
     out = begin.e3[first.node] * (-1.0 if first.finish else 1.0)  # from the body into the rod
     if not size.any():

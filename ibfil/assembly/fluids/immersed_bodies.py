@@ -72,11 +72,12 @@ class ImmersedBodiesModel(FluidModel):
     def markers(self) -> list[int]:
         """How many markers each of the bodies has."""
         kernel, h = self.case.fluid.kernel, self.space.spacing
-        return [len(shells.markers(self.case, name, kernel, h)) for name in self.case.bodies]
+        return [len(shells.markers(self.case, name, body, kernel, h)) for name, body in self.case.each_body.items()]
 
     def reached(self, rods: RodStack) -> np.ndarray:
         """Places (k, 3) at the start between which all that pushes is: nodes, and bodies to their largest semi-axes."""
-        r, sizes = [rods.start.r], [float(size(self.case, name).max()) for name in self.case.bodies]
+        r = [rods.start.r]
+        sizes = [float(size(self.case, name, body).max()) for name, body in self.case.each_body.items()]
         if rods.bodies:
             centres = rods.start.r[rods.count : rods.count + 2 * len(sizes) : 2]
             r += [centres + sign * np.array(sizes)[:, None] for sign in (-1.0, 1.0)]

@@ -26,20 +26,19 @@ MANY = 600  # markers from which steps by the table take seconds
 _TURNS = 24  # ways to turn the markers of a sphere, of which that farthest from rods is taken
 
 
-def markers(case: Case, name: str, kernel: str, h: float) -> np.ndarray:
+def markers(case: Case, name: str, body: Body, kernel: str, h: float) -> np.ndarray:
     """The markers (k, 3) of a body in its axes: of its file, or of its shell; none of a joint."""
-    found = cloud(case, name)
+    found = cloud(case, name, body)
     if found is not None:
         return found
-    shell = fit(case, name, kernel, h)
+    shell = fit(case, name, body, kernel, h)
     return np.zeros((0, 3)) if shell is None else h * shell.markers
 
 
-def fit(case: Case, name: str, kernel: str, h: float) -> Fit | None:
+def fit(case: Case, name: str, body: Body, kernel: str, h: float) -> Fit | None:
     """The shell of a body, unit h; None where it is a joint or a cloud. Raises CaseError where it is too small."""
     from ...fluids.shells import calibration
 
-    body = case.bodies[name]
     a, b, c = (size / h for size in body.shape.semi_axes)
     if not a:
         return None
@@ -57,8 +56,8 @@ def shells(case: Case, rods: RodStack, kernel: str, h: float) -> Shells:
 
     rows, nodes = rods.with_bodies.rows, rods.nodes_at_start.r
     poses, own = rows.start(), []
-    for b, (name, body) in enumerate(case.bodies.items()):
-        points = markers(case, name, kernel, h)
+    for b, (name, body) in enumerate(case.each_body.items()):
+        points = markers(case, name, body, kernel, h)
         own.append(_turned(points, body, (nodes - poses.centre[b]) @ poses.axes[b]))
     placed = [poses.centre[b] + points @ poses.axes[b].T for b, points in enumerate(own)]
     faults = [f"{case.file}: {fault}" for fault in _in_the_way(case, rods, placed, h)]
@@ -71,7 +70,7 @@ def refuse_below(case: Case, rods: RodStack, kernel: str, h: float, lowest: floa
     """Raises CaseError for bodies whose markers are below a height at the start."""
     start, faults = rods.start, []
     own = shells(case, rods, kernel, h)
-    for name, points in zip(case.bodies, own.clouds(start.r, start.e3), strict=True):
+    for name, points in zip(case.each_body, own.clouds(start.r, start.e3), strict=True):
         height = float(np.min(points[:, 2], initial=np.inf))
         if height < lowest:
             found = f"found markers at z = {height:.3g}, in the wall or too near"
@@ -115,10 +114,11 @@ def _distance(cloud: np.ndarray, others: np.ndarray) -> float:
 
 def _in_the_way(case: Case, rods: RodStack, placed: list[np.ndarray], h: float) -> Iterator[str]:
     """Bodies whose markers are too close to nodes, or to those of another body."""
-    names, nodes = list(case.bodies), rods.nodes_at_start.r
+    tables, nodes = case.each_body, rods.nodes_at_start.r
+    names = list(tables)
     for b, (name, points) in enumerate(zip(names, placed, strict=True)):
         nearest = apart(points).min(initial=np.inf) / h
-        if case.bodies[name].shape.file is not None and nearest < NEAREST:
+        if tables[name].shape.file is not None and nearest < NEAREST:
             found = f"found markers {nearest:.2g} cells apart, which lock against each other"
             yield f"body.{name}.shape.path: {found}; allowed: {NEAREST:g} cells or more"
         for filament, where in zip(rods.names, rods.nodes, strict=True):
@@ -137,10 +137,10 @@ def told(case: Case, kernel: str, h: float) -> list[str]:
     """Lines on the shells of bodies: how many markers, and how well they stand for the bodies."""
     out = []
     for name, body in case.bodies.items():
-        given = cloud(case, name)
+        given = cloud(case, name, body)
         if given is not None:
             out.append(_cloud(name, given / h, kernel, h))
-        found = fit(case, name, kernel, h)
+        found = fit(case, name, body, kernel, h)
         if found is None:
             continue
         met, other = ("rotation", "translation") if body.meets_rotation else ("translation", "rotation")
@@ -184,11 +184,11 @@ def warnings(case: Case, kernel: str, h: float, box: np.ndarray | None, dense: b
     """Bodies that the grid tells badly, or whose markers are many for one ``dense`` system."""
     out, count = [], 0
     for name, body in case.bodies.items():
-        points = markers(case, name, kernel, h)
+        points = markers(case, name, body, kernel, h)
         if not len(points):
             continue
-        count += len(points)
-        least, longest = min(body.shape.semi_axes), float(size(case, name).max())
+        count += len(points) * sum(own is body for own in case.each_body.values())
+        least, longest = min(body.shape.semi_axes), float(size(case, name, body).max())
         if not least:
             out += _spaced(name, apart(points) / h)
         elif least < SMALL * h:

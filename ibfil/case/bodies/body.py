@@ -43,7 +43,7 @@ class Body(Table):
     position: Vector | None = Field(
         None,
         description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod; "
-        "of a file of markers: the origin",
+        "of a file of markers: the origin; a copy of it goes with the copy of its filament",
     )
     axes: Annotated[tuple[Vector, Vector], Listed(2)] = Field(
         ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), description="its first two axes at t = 0, in the lab"

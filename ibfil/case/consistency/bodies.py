@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from ..bodies.body import Body
 from ..bodies.end import End
@@ -28,6 +29,7 @@ def check_bodies(case: Scene) -> Iterator[Fault]:
     for name, body in case.bodies.items():
         yield from _body(f"body.{name}", body, [end for _, _, end in ends_in(case, name)])
     if case.bodies:
+        yield from _copied(case)
         yield from _scene(case)
 
 
@@ -83,13 +85,13 @@ def _motor(key: str, motor: Motor, end: End, filament: Filament) -> Iterator[Fau
 
 
 def _filament(key: str, filament: Filament) -> Iterator[Fault]:
-    """A filament in a body: not one of copies, and begun by the case itself."""
+    """A filament in a body: begun by the case itself."""
     first, last, reads = filament.start, filament.finish, (f"{key}.start", f"{key}.finish")
     if first.attached and last.attached and first.body == last.body and (first.motor or last.motor):
         found = f"{shown(last.body)}, as the start has, and a motor, which would turn it against itself"
         yield Fault(f"{key}.finish.body", found, "another body, or no motor", reads)
-    if filament.copies is not None:
-        yield Fault(f"{key}.copies", "copies of a filament in a body", "a filament and a body for each", reads)
+    if filament.copies is not None and filament.copies.file is not None:
+        yield Fault(f"{key}.copies.file", "a file for copies of a filament in a body", "count with region or at", reads)
     if isinstance(filament.shape, RunShape):
         found = '"run" for a filament in a body, whose pose it does not tell'
         yield Fault(f"{key}.shape.kind", found, "another kind of shape; a run goes on with ibfil run --resume", reads)
@@ -114,6 +116,19 @@ def _body(key: str, body: Body, ends: list[End]) -> Iterator[Fault]:
         yield Fault(f"{key}.shape", found, "at least two ends", ("filament",))
     elif body.torque is not None and all(end.hinged for end in ends):
         yield Fault(f"{key}.torque", "a torque on a joint of hinged ends", "an end in it that is not hinged", (key,))
+
+
+def _copied(case: Scene) -> Iterator[Fault]:
+    """Filaments that bodies join, some of which have copies: all go to the same places."""
+    for body in case.bodies:
+        ends = ends_in(case, body)
+        for (first, one, _), (key, other, _) in pairwise(ends):
+            where, reads = f"{key.rsplit('.', 1)[0]}.copies", (first.rsplit(".", 1)[0], f"{key}.body")
+            if one.copies != other.copies:
+                yield Fault(where, f"other copies than at {first}, in the same body {body}", "the same copies", reads)
+            elif other is not one and other.copies is not None and other.copies.apart is not None:
+                found = f"apart with several filaments in body {body}"
+                yield Fault(f"{where}.apart", found, "one filament in it, or no apart", reads)
 
 
 # --- the scene -------------------------------------------------------------------------------------------------------
