@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -24,6 +24,18 @@ if TYPE_CHECKING:
 TOGETHER = 500  # nodes of linked filaments that a preconditioner takes as one block
 
 
+class Copied(NamedTuple):
+    """Where a copy goes: it is turned (3, 3) ``about`` a point (3,), which then goes to ``point`` (3,)."""
+
+    turn: np.ndarray
+    about: np.ndarray
+    point: np.ndarray
+
+    def place(self, r: np.ndarray) -> np.ndarray:
+        """Places (.., 3) of the filament, in its copy."""
+        return (r - self.about) @ self.turn.T + self.point
+
+
 @dataclass(frozen=True)
 class RodStack:
     """The rods of a scene: names and node ranges of its filaments, arclength (n,), links, and all their mechanics.
@@ -32,7 +44,6 @@ class RodStack:
     """
 
     names: tuple[str, ...]
-    tables: tuple[str, ...]  # the names that the case gives them: of copies one
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
     ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
@@ -43,6 +54,8 @@ class RodStack:
     links: tuple[Link, ...] = ()
     bodies: tuple[str, ...] = ()
     motors: tuple[str, ...] = ()
+    tables: tuple[str, ...] = field(kw_only=True)  # the names that the case gives them: of copies one
+    copied: tuple[Copied | None, ...] = field(kw_only=True)  # where copies went, of each filament
 
     @property
     def count(self) -> int:
@@ -71,6 +84,8 @@ class RodStack:
     def variation(self, table: str, expression: Expression) -> dict[str, np.ndarray]:
         """The values (k,) of i and phase over the copies of a filament, of those that a formula of it uses."""
         mine = [f for name, f in zip(self.tables, self.filaments, strict=True) if name == table]
+        if all(f is mine[0] for f in mine):  # copies that are alike
+            mine = mine[:1]
         found = [dict(f.origin[1]) for it in mine for _, f in expressions(it) if f.origin and f.origin[0] == expression]
         return {name: np.array([one[name] for one in found]) for name in (found[0] if found else ())}
 

@@ -10,11 +10,14 @@ from ..errors import CaseError
 from . import first_step as bench_first_step
 from . import linked as bench_linked
 from . import many as bench_many
+from . import members as bench_members
 from . import pieces
+from . import processes as bench_processes
 from . import spaces as bench_spaces
 from . import swimming as bench_swimming
 from . import thermal as bench_thermal
 from . import threads as bench_threads
+from . import whole_studies as bench_studies
 from .timing import Row, table
 
 
@@ -73,8 +76,11 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],
     "links": lambda: [*bench_linked.linked(6, (280.0, None)), *bench_linked.linked(2, (165.0, None))],
     "body": lambda: bench_swimming.heads(),
+    "studies": lambda: bench_studies.costs(),
     "threads": threads,
     "many": lambda: many(),
+    "members": lambda: bench_members.members(),
+    "mpi": lambda: bench_processes.measured(),
 }
 USUAL = ("pieces", "swimmer")
 
@@ -82,7 +88,8 @@ USUAL = ("pieces", "swimmer")
 def main(json: bool = False, parts: Sequence[str] = ()) -> int:
     """Measures the parts asked for and prints a table, or JSON. Returns 0: a busy machine is no failure.
 
-    The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB.
+    The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB,
+    "members" some three minutes.
     Raises CaseError for a part there is not.
     """
     for part in set(parts) - set(PARTS):

@@ -70,6 +70,14 @@ class Row:
         return "" if self.bar is None else "ok" if self.ratio <= self.bar else "over"
 
 
+def of_children() -> float:
+    """Processor time of all processes that were started and have ended."""
+    import resource
+
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def seconds_of(work: Callable[[], object], repeats: int) -> float:
     """Seconds of one call, the mean of ``repeats``."""
     began = time.perf_counter()

@@ -39,6 +39,13 @@ def count(text: str) -> int:
     return int(text)
 
 
+def port(text: str) -> int:
+    """A port that needs no rights, or 0."""
+    if not text.isascii() or not text.isdigit() or not (int(text) == 0 or 1024 <= int(text) <= 65535):
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: 1024 to 65535, or 0 for one that is free")
+    return int(text)
+
+
 def positive(text: str) -> float:
     """A number above zero."""
     value = _number(text)

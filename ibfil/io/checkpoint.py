@@ -6,7 +6,7 @@ import io
 import os
 from collections.abc import Mapping
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,10 @@ class Checkpoint:
     file: str  # that TOML's name
     wisdom: str
     created: str  # of the run file: tells which run this belongs to
+
+    def copied(self) -> Checkpoint:
+        """Return the same in memory of its own: it stays as it is while the simulation goes on."""
+        return replace(self, state={k: np.copy(v) if isinstance(v, np.ndarray) else v for k, v in self.state.items()})
 
 
 _SCALARS = ("time", "steps", "outputs", "fields", "wall_time", "case", "file", "wisdom", "created")

@@ -7,6 +7,7 @@ import json
 import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache as once
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -20,13 +21,19 @@ if TYPE_CHECKING:
 _LIBRARIES = ("numpy", "scipy", "numba", "pyfftw", "h5py")
 
 
-def versions() -> dict[str, str]:
-    """Versions of ibfil, Python and the libraries that results depend on."""
+@once
+def _versions() -> dict[str, str]:
+    """The same, looked up once: each is a file to parse."""
     found = {"ibfil": __version__, "python": platform.python_version()}
     for library in _LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
             found[library] = metadata.version(library)
     return found
+
+
+def versions() -> dict[str, str]:
+    """Versions of ibfil, Python and the libraries that results depend on."""
+    return dict(_versions())
 
 
 def about(case: Case, method: str, wisdom: str, groups: Mapping[str, float]) -> dict[str, Any]:

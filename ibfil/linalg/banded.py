@@ -47,6 +47,25 @@ def multiply(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
     return out
 
 
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def multiply_each(matrix, x):
+    """The products (k, n, m) of a band matrix with each of x (k, n, m)."""
+    n, m = matrix.shape[:2]
+    w = (matrix.shape[2] // m - 1) // 2
+    out = np.zeros(x.shape)
+    flat = x.reshape(len(x), -1)
+    for i in range(n):
+        low, high = max(0, i - w), min(n, i + w + 1)
+        shift = (low - i + w) * m
+        for each in range(len(x)):
+            for a in range(m):
+                s = 0.0
+                for k in range((high - low) * m):
+                    s += matrix[i, a, shift + k] * flat[each, low * m + k]
+                out[each, i, a] = s
+    return out
+
+
 @njit(cache=True, fastmath={"contract"})
 def _transposed_product(matrix, full, factor, out):
     n, m, length = out.shape

@@ -60,6 +60,14 @@ class Stiffness(NamedTuple):
             _add_products(*self.pairs, x, out)
         return out
 
+    def times_each(self, x: np.ndarray) -> np.ndarray:
+        """K x (k, n, m) for each of x (k, n, m)."""
+        out = banded.multiply_each(self.band, np.ascontiguousarray(x))
+        if self.coupled:
+            for one, product in zip(x, out, strict=True):
+                _add_products(*self.pairs, one, product)
+        return out
+
     def dense(self) -> np.ndarray:
         """The same matrix in full, (n, m, n, m)."""
         out = banded.dense(self.band)

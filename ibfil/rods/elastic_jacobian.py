@@ -117,15 +117,20 @@ class Stencils(NamedTuple):
 def stencils(mesh: Mesh) -> Stencils:
     """The mesh's stencils, three by three."""
     n, p = mesh.w1.shape
-    beside = [[k for k in (i - 1, i, i + 1) if k == i or (0 <= k < n and mesh.joined[min(i, k)])] for i in range(n)]
-    start = np.array([min(mesh.first[k] for k in nodes) for nodes in beside])
-    reach = np.array([max(mesh.first[k] for k in nodes) + p for nodes in beside]) - start
+    every, first = np.arange(n), mesh.first
+    joined = np.concatenate(
+        [[False], mesh.joined[: n - 1], [False]]
+    )  # each node with the one before, the last with none
+    beside = [(k, np.nonzero(there)[0]) for k, there in ((-1, joined[:-1]), (0, every >= 0), (1, joined[1:]))]
+    start, end = first.copy(), first.copy()
+    for k, i in beside:
+        start[i], end[i] = np.minimum(start[i], first[i + k]), np.maximum(end[i], first[i + k])
+    reach = end + p - start
     weights = np.zeros((n, reach.max(), 6))
-    for i, nodes in enumerate(beside):
-        for k in nodes:
-            at = slice(mesh.first[k] - start[i], mesh.first[k] - start[i] + p)
-            weights[i, at, 2 * (k - i + 1)] = mesh.w2[k]
-            weights[i, at, 2 * (k - i + 1) + 1] = mesh.w1[k]
+    for k, i in beside:
+        at = (first[i + k] - start[i])[:, None] + np.arange(p)
+        weights[i[:, None], at, 2 * (k + 1)] = mesh.w2[i + k]
+        weights[i[:, None], at, 2 * (k + 1) + 1] = mesh.w1[i + k]
     return Stencils(start, reach, weights)
 
 

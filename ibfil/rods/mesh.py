@@ -11,11 +11,13 @@ prescribed, so ``W1`` is zero there, ``c1 = T``, and ``r''`` is the cubic throug
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..linalg.banded import Profile
+from ..linalg.compiled import njit
 from ..linalg.finite_differences import clamped_weights, ghost_weights, weights
 
 
@@ -66,6 +68,14 @@ class Segmented(NamedTuple):
 
 def _stencils(s: np.ndarray, derivative: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """First node, weights of r' and of r'' for one free filament: 7 points, or 3 (4 for r'' at the ends)."""
+    first, w1, w2 = _known_stencils(s.tobytes(), derivative)
+    return first.copy(), w1.copy(), w2.copy()
+
+
+@lru_cache(maxsize=64)
+def _known_stencils(places: bytes, derivative: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same, found once for filaments whose nodes are at the same places (n doubles)."""
+    s = np.frombuffer(places)
     n, p = len(s), (7 if derivative == 6 else 4)
     first, w1, w2 = np.zeros(n, np.int64), np.zeros((n, p)), np.zeros((n, p))
     for i in range(n):
@@ -152,6 +162,14 @@ def _spread(low: np.ndarray, high: np.ndarray, joined: np.ndarray, times: int) -
     return low, high
 
 
+@njit(cache=True)
+def _filled(first, last):
+    """Has each row reach as far as those above it do that it takes part in: what elimination fills."""
+    for i in range(len(first)):
+        for k in range(first[i], i):
+            last[i] = max(last[i], last[k])
+
+
 def profile(mesh: Mesh, neighbours: int = 1) -> Profile:
     """Which displacements a node's force feels: its stencils and those of ``neighbours`` each side; fill included."""
     n, p = mesh.w1.shape
@@ -163,6 +181,5 @@ def profile(mesh: Mesh, neighbours: int = 1) -> Profile:
     low = np.minimum(np.where(used, columns, n).min(axis=1), rows)
     high = np.maximum(np.where(used, columns, -1).max(axis=1), rows)
     first, last = _spread(low, high, joined, neighbours)
-    for i in range(n):
-        last[i] = max(last[i], last[first[i] : i + 1].max())
+    _filled(first, last)
     return Profile(first, last, max(width, int(np.max(last - rows))))

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from ..errors import Interrupted, RunFailed, Stopped
 from ..io import checkpoint
@@ -44,10 +41,12 @@ class Loop:
         log: Callable[[str], object],
         progress: bool,
         rules: StopRules | None = None,
+        extends: bool = True,
     ) -> None:
+        """``extends``: the run may be made longer one day; without it checkpoints are of runs that are cut alone."""
         self.simulation, self.case, self._observed = simulation, simulation.case, seen
         self._rules = rules or StopRules(self.case, seen)
-        self._log, self._show = log, progress
+        self._log, self._show, self._extends = log, progress, extends
         self._signals = Signals()
         self._recorder: Recorder | None = None
         self._path: Path | None = None
@@ -87,7 +86,7 @@ class Loop:
                 )
                 if snapshot.grid:
                     self._recorder.append_fields(snapshot.time, snapshot.grid)
-                self._checkpoint()
+                self._begin()
             reason = self._rules.check(snapshot.time)
             return ("stopped", reason) if reason else self._steps(rest)
 
@@ -120,8 +119,9 @@ class Loop:
         simulation, slack = self.simulation, SAME * self.case.time.end
         self._progress = Progress(simulation.time, self.case.time.end, self._log, self._show)
         for due in dues:
-            if due is dues[-1] and self._recorder is not None and not lasts(self.case, simulation.grid is not None):
-                self._longer = _copied(self._present(self._recorder))
+            longer = due is dues[-1] and self._extends and not lasts(self.case, simulation.grid is not None)
+            if longer and self._recorder is not None:
+                self._longer = self._present(self._recorder).copied()
             if due.time > simulation.time + slack:
                 try:
                     simulation.advance(due.time, self._after_step)
@@ -250,16 +250,24 @@ class Loop:
         return failure
 
     def _finished(self, status: str, reason: str) -> Result:
-        """Close the run file. The checkpoint stays, to make it longer, but where a rule has ended it."""
+        """Close the run file. The checkpoint stays, where it is to be made longer and no rule has ended it."""
         if self._recorder is not None and self._path is not None:
-            if status == "finished":
+            kept = status == "finished" and self._extends
+            if kept:
                 self._keep()
             self._recorder.finish(status, reason, **self._attributes())
-            if status != "finished":
+            if not kept:
                 checkpoint_path(self._path).unlink(missing_ok=True)
         assert self._snapshot is not None
         steps, wall_time = self.simulation.steps, self._wall_time()
         return Result(self.case, status, reason, self._path, steps, wall_time, self._snapshot, self._observed)
+
+    def _begin(self) -> None:
+        """Have a checkpoint of the start, where it is of use: a run that nobody makes longer begins as fast anew."""
+        if self._extends:
+            self._checkpoint()
+        else:
+            self._next_checkpoint = clock.monotonic() + self.case.output.checkpoint_every
 
     def _keep(self) -> None:
         """Write what a longer run goes on from; where that fails an earlier checkpoint has to do, and it is told."""
@@ -286,8 +294,3 @@ class Loop:
         except Exception:  # what went wrong first is what counts
             self._recorder.close()
             record_end(self._path, "failed", reason)
-
-
-def _copied(one: checkpoint.Checkpoint) -> checkpoint.Checkpoint:
-    """The same, in memory of its own: it stays as it is while the simulation goes on."""
-    return replace(one, state={k: np.copy(v) if isinstance(v, np.ndarray) else v for k, v in one.state.items()})

@@ -49,6 +49,7 @@ def run(
     laws: Mapping[str, MomentLaw] | None = None,
     build: Build | None = None,
     look: Look = overview_of,
+    extends: bool = True,
 ) -> Result:
     """Run a case and write the run file ``output``; None writes nothing.
 
@@ -58,7 +59,8 @@ def run(
     ``observables`` are further ones, made
     in Python, and ``laws`` constitutive laws by filament (rods/constitutive.py). ``build`` makes the simulation from
     the case and FFTW wisdom, by default `Simulation` with
-    these laws, and ``look`` says what is told of it before it runs.
+    these laws, and ``look`` says what is told of it before it runs. Without ``extends`` the run is not to be made
+    longer one day: a checkpoint is written only where it is cut, or takes longer than `output.checkpoint_every`.
 
     Raises CaseError (also where ``output`` exists and ``overwrite`` is not set), RunFailed, and Interrupted
     after Ctrl-C or SIGTERM; a second one kills.
@@ -80,7 +82,7 @@ def run(
     overview = look(simulation)
     for line in _banner(simulation, overview):
         log(line)
-    return Loop(simulation, seen, log, progress).start(path, overwrite, overview.groups)
+    return Loop(simulation, seen, log, progress, extends=extends).start(path, overwrite, overview.groups)
 
 
 def resume_run(

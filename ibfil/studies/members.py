@@ -64,7 +64,8 @@ def run_members(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError([f"{folder}: cannot be made ({error.strerror})"]) from None
-    outcomes = {member.name: _standing(member, folder, log) for member in members}
+    # What cannot be read is not sent to other machines.
+    outcomes = {member.name: _standing(member, folder, log, read=executor is not None) for member in members}
     for known in outcomes.values():
         if not known.done and known.status != "waiting":
             log(_line(known))
@@ -119,8 +120,9 @@ def _run(case: Case, path: Path) -> tuple[str, str]:
     with contextlib.suppress(CaseError):  # no checkpoint, or one that cannot be read
         last = read(checkpoint_path(path))
         begun = path.exists() and not _differing(parse_case(last.case, last.file), case)
-    result = run(case, path, overwrite=True, resume=begun, progress=False, log=stop_if_cut)
-    checkpoint_path(path).unlink(missing_ok=True)  # many small files, for runs that are of one length
+    # No checkpoint stays: many small files, for runs that are of one length.
+    result = run(case, path, overwrite=True, resume=begun, progress=False, log=stop_if_cut, extends=False)
+    checkpoint_path(path).unlink(missing_ok=True)
     return result.status, result.reason
 
 
@@ -157,12 +159,17 @@ def of_other_cases(members: Sequence[Member], folder: Path) -> dict[str, list[st
     return {name: keys for name, keys in found.items() if keys}
 
 
-def _standing(member: Member, folder: Path, log: Log) -> Outcome:
-    """How far a member is: as its file says, failed where its case is at fault, waiting where there is work to do."""
+def _standing(member: Member, folder: Path, log: Log, read: bool = False) -> Outcome:
+    """How far a member is: as its file says, failed where its case is at fault, waiting where there is work to do.
+
+    The case of one without a file is left unread but where ``read`` is set: those of hundreds take seconds.
+    """
     from ..errors import RunFileError
     from ..io.reader import RunFile
 
     path = folder / f"{member.name}.h5"
+    if not path.exists() and not read:
+        return Outcome(member, "waiting", path)
     try:
         case = member.resolved()
     except CaseError as error:

@@ -31,6 +31,7 @@ class Swept:
     numbers: dict[str, float]
     errors: dict[str, float]
     about: dict[str, Any]  # steps, wall_time, method
+    thermal: bool = False  # there are random forces
 
     def row(self) -> dict[str, Any]:
         """Return its row of the table."""
@@ -98,7 +99,7 @@ class OtherCases(CaseError):
 
 def means_over_seeds(rows: Sequence[Swept]) -> list[Mean]:
     """Means and standard errors over the runs that differ in the seed of their thermal forces alone; [] if none do."""
-    done = [row for row in rows if row.outcome.done]
+    done = [row for row in rows if row.outcome.done and row.thermal]
     return means([(row.outcome.member.resolved(), row.setting.values, row.numbers) for row in done])
 
 
@@ -111,7 +112,8 @@ def _swept(setting: Setting, outcome: Outcome) -> Swept:
         about = {"steps": run.steps, "wall_time": run.wall_time, "method": run.method}
         found = numbers_with_errors(run)
         errors = {name: error for name, (_, error) in found.items() if error is not None}
-        return Swept(setting, outcome, {name: value for name, (value, _) in found.items()}, errors, about)
+        numbers, thermal = {name: value for name, (value, _) in found.items()}, run.case.thermal is not None
+        return Swept(setting, outcome, numbers, errors, about, thermal)
 
 
 def listing(case: str, axes: Sequence[Axis], overrides: Sequence[str] = ()) -> list[str]:

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from ibfil.bench import first_step, linked, many, parts, pieces, spaces, thermal, timing
+from ibfil.bench import first_step, linked, many, members, parts, pieces, spaces, thermal, timing
 from ibfil.commands import bench
 from ibfil.errors import CaseError
 
@@ -53,6 +53,20 @@ def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monke
     found = json.loads(subprocess.run(asked, capture_output=True, check=True, text=True).stdout)
     assert 0 < found["seconds"] < found["peak"]
     assert found["method"] == "table"
+
+
+def test_members_of_a_study_are_a_sweep_by_the_command(tmp_path):
+    found = members.swept(2, 0.02, tmp_path / "sweep")
+    assert found.steps == 4
+    assert 0 < found.stepping < found.processor
+
+
+def test_what_a_member_takes_is_told_beside_its_steps(monkeypatch):
+    told = [members.Swept(9.0, 0.1, 5.0, 2), members.Swept(5.0, 0.1, 3.0, 2), members.Swept(115.0, 100.0, 60.0, 100000)]
+    monkeypatch.setattr(members, "swept", lambda *scene: told.pop(0))
+    whole, clock, _ = members.members(100)
+    assert whole.ratio == pytest.approx((115 - 5) / 100 + 5 / 500)
+    assert clock.ratio == pytest.approx(2 * 60 / 115)
 
 
 def test_a_part_there_is_not_is_refused():

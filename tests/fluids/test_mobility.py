@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from ibfil.fluids import mobility_table
+from ibfil.fluids.coupling import TRANSLATION
+from ibfil.fluids.spaces import periodic
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.stokes import StokesSolve
 from ibfil.grid.kernels import KERNELS, Kernel
 from ibfil.grid.periodic_grid import Grid
@@ -215,3 +218,21 @@ def test_spectrum_of_a_rod_whose_nodes_are_closer_than_cells():
     values = np.linalg.eigvalsh(m)
     assert values.max() == pytest.approx(12.5668, abs=1e-3)
     assert values.min() == pytest.approx(1.557e-6, abs=0.0005e-6)  # four digits
+
+
+@pytest.mark.parametrize("number", [np.float64, np.float32])
+def test_one_kept_octant_serves_all_viscosities(number, monkeypatch):
+    cells, made = (16, 11, 14), []
+    space = PeriodicSpace(tuple(n * H for n in cells), cells)
+
+    def found(viscosity: float) -> np.ndarray:
+        return space.mobility(TRANSLATION, 4, viscosity, number=number)._octant.values
+
+    direct = [found(eta) for eta in (1.0, 2.7)]
+    monkeypatch.setattr(periodic, "_LARGE", 1)
+    monkeypatch.setattr(periodic.cache, "table", lambda key, make: made.append(key) or make())
+    kept = [found(eta) for eta in (1.0, 2.7, 1.0)]
+    assert len(made) == 1
+    assert kept[0].tobytes() == kept[2].tobytes() == direct[0].tobytes()
+    assert kept[1].dtype == number
+    assert np.abs(kept[1] - direct[1]).max() < 3 * np.finfo(number).eps * np.abs(direct[1]).max()

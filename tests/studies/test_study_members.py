@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -176,7 +177,7 @@ def test_after_a_signal_everything_can_be_gone_on_with(tmp_path, jobs, said):
     command = [sys.executable, "study.py", str(folder), str(jobs)]
     study = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, start_new_session=True)
     begun = [folder / f"{name}.h5" for name in ("one", "two")[:jobs]]
-    wait_for(lambda: all(checkpoint_path(path).exists() for path in begun), study)
+    wait_for(lambda: all(path.exists() and path.stat().st_size for path in begun), study)
     os.killpg(study.pid, signal.SIGINT)  # as Ctrl-C does
     out, _ = study.communicate(timeout=300)
     assert study.returncode == 130, out
@@ -220,6 +221,27 @@ def test_the_pace_of_a_run_leaves_its_start_out_and_adds_its_parts_up(tmp_path):
     assert covered == pytest.approx(result.case.time.end * (1 - 1 / result.steps))
     assert 0 < seconds <= result.wall_time
     assert processor > 0
+
+
+def test_a_member_writes_checkpoints_only_where_it_takes_long_and_keeps_none(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr("ibfil.running.loop.checkpoint.write", lambda path, one: written.append(one.time))
+    assert work(GOOD, str(tmp_path)).done
+    assert not written
+    long = replace(GOOD, name="long", overrides=(*GOOD.overrides, "output.checkpoint_every=1e-9"))
+    assert work(long, str(tmp_path)).done
+    assert 0 < written[0] < long.resolved().time.end
+    count = len(written)
+    run(GOOD.resolved(), tmp_path / "whole.h5", progress=False, log=lambda line: None)
+    assert len(written) == count + 2  # at the start and at the end of one that may be made longer
+    assert content(tmp_path / "good.h5") == content(tmp_path / "whole.h5")
+
+
+def test_the_cases_of_members_without_a_file_are_read_where_they_are_run(tmp_path, monkeypatch, said):
+    read = []
+    monkeypatch.setattr(Member, "resolved", lambda self, real=Member.resolved: read.append(self.name) or real(self))
+    run_members([GOOD, ODD], tmp_path, log=said.append)
+    assert read == ["good", "odd"]
 
 
 def test_ctrl_c_before_the_first_step_is_no_failure(tmp_path, monkeypatch, said):

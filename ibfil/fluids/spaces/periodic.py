@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache as once
 from functools import cached_property
@@ -54,30 +55,51 @@ class PeriodicSpace:
     def mobility(
         self, coupling: Coupling, points: int, viscosity: float, alpha: float = 0.0, number: type = np.float64
     ) -> TableMobility:
-        """By the grid's response to one cell, whose octant is kept in the user's cache where it is large."""
+        """By the grid's response to one cell, whose octant is kept in the user's cache where it is large.
 
-        def made() -> np.ndarray:
-            return mobility_table.octant(coupling.response(self.grid, viscosity, alpha), points, number).values
+        In Stokes flow it is that of viscosity 1, divided by the viscosity: one table for all of them.
+        """
 
-        values = cache.table(self._key(coupling, points, viscosity, number), made) if self._kept(alpha) else made()
+        def made(eta: float) -> np.ndarray:
+            return mobility_table.octant(coupling.response(self.grid, eta, alpha), points, number).values
+
+        if alpha:
+            values = made(viscosity)
+        else:
+            key = self._key(coupling, points, number)
+            unit = _at_hand(key, lambda: made(1.0)) if self._kept() else made(1.0)
+            values = unit if viscosity == 1.0 else unit / number(viscosity)
         return TableMobility(coupling, mobility_table.Octant(values, np.array(self.cells, np.int64)))
 
-    def _kept(self, alpha: float) -> bool:
+    def _kept(self) -> bool:
         """Whether it is worth it. With inertia each length of a step has a table: they would drive out all others."""
-        return alpha == 0 and int(np.prod(self.cells)) >= _LARGE and bool(_code())
+        return int(np.prod(self.cells)) >= _LARGE and bool(_code())
 
-    def _key(self, coupling: Coupling, points: int, viscosity: float, number: type) -> dict[str, object]:
-        """All that an octant depends on."""
+    def _key(self, coupling: Coupling, points: int, number: type) -> dict[str, object]:
+        """All that an octant of unit viscosity depends on."""
         passed = f"{type(coupling).__module__}.{type(coupling).__qualname__}"
         return {
             "box": [float(side).hex() for side in self.box],
             "cells": list(self.cells),
             "points": points,
-            "viscosity": float(viscosity).hex(),
             "number": np.dtype(number).str,
             "coupling": passed,
             "versions": [np.__version__, scipy.__version__, _code()],
         }
+
+
+_last: dict[str, np.ndarray] = {}  # the last octant, by its key
+
+
+def _at_hand(key: dict[str, object], make: Callable[[], np.ndarray]) -> np.ndarray:
+    """The octant of the last run of this process, as runs of a study have the same, or that of the user's cache."""
+    text = repr(key)
+    values = _last.get(text)
+    if values is None:
+        values = cache.table(key, make)
+        _last.clear()
+        _last[text] = values
+    return values
 
 
 @once

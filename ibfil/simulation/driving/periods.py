@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from functools import reduce
+from functools import lru_cache, reduce
 from math import gcd, lcm
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ _PLACES = 5  # and places
 _GOLDEN = 0.5 * (5**0.5 - 1)
 
 Sampled = tuple[Tree, Mapping[str, np.ndarray]]  # a tree, and the values (p,) of its variables beside t
+_Plain = tuple[Tree, tuple[tuple[str, bytes], ...]]  # the same, as a key of what is known
 
 
 class Period(NamedTuple):
@@ -38,8 +39,16 @@ class Period(NamedTuple):
 def common_period(drives: Sequence[Sampled], turns: Sequence[float], end: float) -> Period | None:
     """The period of expressions that use t, and of ends that turn at steady rates; None where they have none.
 
-    They are compared up to ``end``, and over some periods at least.
+    They are compared up to ``end``, and over some periods at least. Runs of a study ask it of the same expressions.
     """
+    plain = tuple((tree, tuple((name, v.tobytes()) for name, v in places.items())) for tree, places in drives)
+    return _common_period(plain, tuple(turns), float(end))
+
+
+@lru_cache(maxsize=64)
+def _common_period(plain: tuple[_Plain, ...], turns: tuple[float, ...], end: float) -> Period | None:
+    """The same, of drives whose values are bytes."""
+    drives = [(tree, {name: np.frombuffer(values) for name, values in places}) for tree, places in plain]
     lengths = [
         np.pi / abs(rate) if half else 2 * np.pi / abs(rate) for tree, _ in drives for rate, half in _rates(tree)
     ]
