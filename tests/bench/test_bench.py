@@ -99,7 +99,7 @@ def test_the_first_step_is_timed_in_processes_with_caches_of_their_own(monkeypat
         assert env["NUMBA_CACHE_DIR"].startswith(cwd)
 
     monkeypatch.setattr(first_step.subprocess, "run", run)
-    monkeypatch.setattr(first_step, "_children", iter(range(22)).__next__)
+    monkeypatch.setattr(first_step, "of_children", iter(range(22)).__next__)
     rows = first_step.first_step()
     assert [row.bar for row in rows] == [1.0, 1.0, None]
     assert [words for words, *_ in asked[:6]] == [("ibfil", "run")] * 6
