@@ -123,7 +123,7 @@ class _Bordered(_Response):
         assert carried is not None
         base = self._carried(target)
         moved, m = y - base, force.shape[1]
-        at, value = _inside(held, carried, y, n * m)
+        at, value = held.of_nodes(y, n * m)
         rows = Rows.of(stiffness, np.unique(at // m))
         right = _system(stiffness.band, self.drag, self.e3, moved[:n], force[:n], inverse)
         _hold(stiffness.band, right, at, value)
@@ -186,7 +186,7 @@ class _Bordered(_Response):
         carried, n, m = held.carried, self._n, force.shape[1]
         assert carried is not None
         base = self._carried(target)
-        at, value = _inside(held, carried, np.zeros_like(force), n * m)
+        at, value = held.of_nodes(np.zeros_like(force), n * m)
         first = base[:n] + self.tau * mobilize(self.drag, self.e3, force[:n])
         first.ravel()[at] = value
         each = np.zeros((len(carried.by), n * m))
@@ -204,13 +204,6 @@ class _Bordered(_Response):
         reaction[:n] = _at(Prescribed(at, value), felt - force[:n])
         reaction[n:] = own[1]
         return Solution(y, np.concatenate([felt, own[0]]), reaction)
-
-
-def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The unknowns of nodes that are held or carried, and the corrections of these while bodies stay."""
-    inside = held.at < count
-    value = held.value[inside] - y.ravel()[held.at[inside]]
-    return np.concatenate([held.at[inside], carried.at]), np.concatenate([value, carried.value])
 
 
 def _spread(dq: np.ndarray, carried: Carried, shape: tuple[int, ...], n: int) -> np.ndarray:

@@ -54,3 +54,14 @@ class Prescribed(NamedTuple):
     at: np.ndarray
     value: np.ndarray
     carried: Carried | None = None
+
+    def of_nodes(self, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The held and then the carried among the first ``count`` unknowns (k,), and their moves while bodies stay.
+
+        ``y`` (N, m) are the displacements so far.
+        """
+        assert self.carried is not None
+        inside = self.at < count
+        still = self.at[inside]
+        value = np.concatenate([self.value[inside] - y.ravel()[still], self.carried.value])
+        return np.concatenate([still, self.carried.at]), value

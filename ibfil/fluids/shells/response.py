@@ -159,7 +159,7 @@ class WithShells:
         moved, flow, rigid = self._shells.of_rows(y - target), self._flow, self._rigid
         if coming is not None:
             flow, rigid = coming[:n] / self.tau, self._rigid.drifting(coming[n:, :3].ravel() / self.tau)
-        at, value = _inside(held, carried, y, n * m)
+        at, value = held.of_nodes(y, n * m)
         base = self._base(rigid, target[:n], flow, moved) - y[:n]
         parts = self._first_and_each(stiffness, (at, value), (force[:n], base), carried)
         return self._whole(held, (rigid, *parts), y, moved)
@@ -267,14 +267,6 @@ def without_stiffness(force: np.ndarray, held: Prescribed, n: int) -> tuple[np.n
     m = force.shape[1]
     assert held.carried is not None
     return force, Stiffness(np.zeros((n, m, 3 * m)), no_pairs(m)), held._replace(carried=frozen(held.carried))
-
-
-def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The held and then the carried among the first unknowns (k,), and their moves (k,) while bodies stay."""
-    inside = held.at < count
-    still = held.at[inside]
-    value = np.concatenate([held.value[inside] - y.ravel()[still], carried.value])
-    return np.concatenate([still, carried.at]), value
 
 
 def _times(stiffness: Stiffness, x: np.ndarray, m: int) -> np.ndarray:
