@@ -46,12 +46,15 @@ def test_a_number_of_the_gallery_is_found_again(tmp_path, monkeypatch):
     assert (tmp_path / "end_moment.png").exists()
 
 
-def commands_as_python(text: str) -> str:
+LONG = {"bending_modulus", "swimmer_in_an_evening", "thermal_filaments", "which_drag_kernel_step"}
+FILE = re.compile(r"^```\w+\n# ([\w-]+\.(?:toml|py|csv))\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+COMMAND = re.compile(r"^\$ ibfil ((?:.*\\\n)*.*)$", re.MULTILINE)
+
+
+def as_python(text: str) -> str:
     """A page for doctest: fences left out, and a command, ``$ ibfil ...``, as the call that prints what it prints."""
-    text = re.sub(r"^```.*$", "", text, flags=re.MULTILINE)
-    return re.sub(
-        r"^\$ ibfil (.*(?:\\\n.*)*)$", lambda found: f">>> command({_joined(found[1])!r})", text, flags=re.MULTILINE
-    )
+    text = re.sub(r"^```.*$", "", FILE.sub("", text), flags=re.MULTILINE)
+    return COMMAND.sub(lambda found: f">>> command({_joined(found[1])!r})", text)
 
 
 def _joined(line: str) -> str:
@@ -65,12 +68,29 @@ def command(words: str) -> None:
         print(f"exit status {status}")
 
 
-@pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
+def test_the_commands_cases_and_examples_of_all_tutorials_can_be_read(tmp_path):
+    """The quick form of those that are long."""
+    for path in TUTORIALS:
+        text = path.read_text(encoding="utf-8")
+        for name, content in FILE.findall(text):
+            assert not name.endswith(".toml") or ibfil.parse_case(content, name).filaments
+        for found in COMMAND.finditer(text):
+            assert command_line.parse(shlex.split(_joined(found[1]))).do
+        for example in doctest.DocTestParser().get_examples(as_python(text)):
+            compile(example.source, path.stem, "single")
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in LONG)) for path in TUTORIALS]
+)
 def test_the_examples_of_a_tutorial_run(path: Path, tmp_path, monkeypatch):
-    """In an empty folder, as a reader does; numbers are compared as they are shown."""
+    """In a folder with the files that it shows, as a reader does; numbers are compared as they are shown."""
     monkeypatch.chdir(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    for name, content in FILE.findall(text):
+        (tmp_path / name).write_text(content)
     globs = {"command": command, "__name__": "__main__"}
-    page = doctest.DocTestParser().get_doctest(commands_as_python(path.read_text()), globs, path.stem, str(path), 0)
+    page = doctest.DocTestParser().get_doctest(as_python(text), globs, path.stem, str(path), 0)
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     found = doctest.DocTestRunner(optionflags=flags).run(page)
     assert found.attempted > 0
