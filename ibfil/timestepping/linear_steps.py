@@ -18,6 +18,7 @@ from ..rods.geometry import Configuration
 from .base import Stepper
 from .linear_motion import LinearMotion
 
+_SAME, _UNLIKE = 1e-5, 0.6  # of a rate; of a vector, left of it beside those of a mode that is like it
 _NOTHING = 1e-300  # of a mode that a step takes away
 MOST = 800  # unknowns up to which all modes are found
 
@@ -34,6 +35,14 @@ class Course(NamedTuple):
         with np.errstate(over="ignore", invalid="ignore"):
             power: np.ndarray = (share * np.exp(np.multiply.outer(times, self.rates))) @ self.vectors.T
         return power.real
+
+    def rate(self, x: np.ndarray) -> complex:
+        """The rate of the vector that is most like x (k,); no number where none is."""
+        sizes = np.linalg.norm(self.vectors, axis=0) * np.linalg.norm(x)
+        rate = self.rates[np.argmax(np.abs(self.vectors.conj().T @ x) / sizes)]
+        same = self.vectors[:, np.abs(self.rates - rate) <= _SAME * abs(rate)]  # in two planes, turned
+        left = x - same @ np.linalg.lstsq(same, x, rcond=None)[0]
+        return complex(rate) if np.linalg.norm(left) < _UNLIKE * np.linalg.norm(x) else complex("nan")
 
 
 class Spectrum:

@@ -32,5 +32,8 @@ class SemiImplicit:
         return _finish(system, state, dt, answer.move, answer.move / dt, answer, 1, response)
 
     def amplification(self, z: np.ndarray) -> np.ndarray:
-        """No number: what is left out of the matrix under compression is not told by the eigenvalue alone."""
+        """No number: what is left out of the matrix under compression is not told by the eigenvalue alone.
+
+        Their own modes are in linear_steps.py.
+        """
         return np.full(np.shape(z), np.nan + 0j)

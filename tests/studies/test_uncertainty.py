@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from ibfil.commands.main import main
 from ibfil.errors import CaseError, RunFailed
 from ibfil.simulation.simulation import Simulation
 from ibfil.studies.estimates import estimate
-from ibfil.studies.uncertainty import levels, place, study
+from ibfil.studies.uncertainty import levels, place, sampling, study
 from ibfil.studies.uncertainty.results import Source
 from ibfil.studies.uncertainty.study import uncertainty
 
@@ -137,6 +138,28 @@ def test_thermal_numbers_scatter_between_blocks_and_hide_the_rest(tmp_path):
     assert whole.runs == 8
     values = source(again["tip"], "seeds").estimate.values
     assert source(again["tip"], "seeds").estimate.doubt == pytest.approx(2.3646 * np.std(values, ddof=1) / np.sqrt(8))
+
+
+@pytest.mark.parametrize(("memories", "covered"), [(16, 0.88), (64, 0.94)])
+def test_bars_of_chance_cover_the_mean_of_what_forgets_within_the_window(memories, covered, monkeypatch):
+    """An Ornstein-Uhlenbeck series of mean zero, ``memories`` times as long as its memory (README)."""
+    monkeypatch.setattr(sampling, "average", lambda one: True)
+    trials, outputs, chance = 800, 400, np.random.default_rng(3)
+    keep, time = np.exp(-memories / outputs), np.linspace(0, 1, outputs)
+    x = chance.standard_normal((outputs, trials))
+    for k in range(1, outputs):
+        x[k] = keep * x[k - 1] + np.sqrt(1 - keep**2) * x[k]
+    inside = [abs(one.mean()) <= _doubt(time, one) for one in x.T]
+    assert np.mean(inside) == pytest.approx(covered, abs=0.025)
+
+
+def _doubt(time, series):
+    def over(name, start, end):
+        return {"mean": float(series[(time >= start) & (time <= end)].mean())}
+
+    observable = SimpleNamespace(over=None)
+    run = SimpleNamespace(numbers=lambda: {"mean": 0.0}, observables={"mean": observable}, time=time, over=over)
+    return sampling.blocks(run)["mean"].estimate.doubt
 
 
 def test_rods_together_are_refined_together(tmp_path):

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...errors import RunFailed
 from ...timestepping.equilibrium import residual_of
+from ...timestepping.linear_steps import MOST, Spectrum
 from ...timestepping.spectrum import followed
 from ..estimates import Estimate, estimate
 from ..settings import source
@@ -65,6 +66,7 @@ def modes(
     step = scene.simulation.step_length if step is None else step
     shape = Shape(scene, rest.configuration)
     found, zeros, left_out = own_modes(scene, motion, shape, count, step)
+    found = _seen_by_own_steps(found, scene, motion, step)
     levels = [scene if not over else scene_of(whole, (*overrides, *over)) for over in node_levels(own)]
     found, lost = _with_bars(found, levels, own_level(own), rest)
     limit = None if critical is None else threshold(whole, overrides, *critical, log)
@@ -136,6 +138,18 @@ def seen(scene: SceneAtRest, value: complex, step: float) -> dict[str, complex]:
         factor = scheme.amplification(np.array([value * step]))[0]
         out[name] = complex(np.log(factor + 0j) / step)
     return out
+
+
+def _seen_by_own_steps(found: list[Mode], scene: SceneAtRest, motion: LinearMotion, step: float) -> list[Mode]:
+    """The same modes with the growth by the case's own scheme where that has no factor of its own: from its matrix."""
+    scheme, name = scene.simulation.model.stepper, scene.simulation.case.time.scheme
+    unknown = [mode for mode in found if np.isnan(mode.seen.get(name, 0.0))]
+    if not unknown or motion.free.size > MOST:
+        return found
+    steps = Spectrum(motion).steps(scheme, step)
+    return [
+        replace(mode, seen={**mode.seen, name: steps.rate(mode.vector.ravel()[motion.free]) / step}) for mode in found
+    ]
 
 
 def _with_bars(found: list[Mode], levels: Sequence[SceneAtRest], own: int, rest: Rest) -> tuple[list[Mode], list[str]]:
