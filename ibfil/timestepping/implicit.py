@@ -16,7 +16,6 @@ from .base import FAILURES, Bodies, NotConverged, State, Step, StiffnessOf, Syst
 # Newton's own error after a correction is some hundredth of it: an iterative solve need not be better than a tenth of
 # that. Nodes may differ: of many, one may be off by so many times the relative error of all.
 ERROR, WORST = 3e-4, 10.0
-COARSE = 0.03  # of a first correction: Newton's own error after it is as large
 
 
 @njit(cache=True)
@@ -155,7 +154,7 @@ class Implicit:
                 matrix = system.stiffness(configuration, equation.start, inner, equation.time)
                 exact += 1
             held = equation.prescribed(y, configuration, inner)
-            answer = equation.response.implicit(force, matrix, held, y, equation.target, self._error(count))
+            answer = equation.response.implicit(force, matrix, held, y, equation.target, ERROR)
             size = _size(answer.move, system.length)
             enough = max(enough, self.share * size) if count == 1 else enough
             rate = size / max(last, self.tolerance)
@@ -170,10 +169,6 @@ class Implicit:
                 return y, answer, count
             configuration, last = system.move(equation.start, y), size
         raise NotConverged(f"corrections do not shrink after {count} iterations", 0)
-
-    def _error(self, count: int) -> float:
-        """The relative error of an iterative solve that serves in the ``count``th iteration."""
-        return max(ERROR, COARSE if self.share and count == 1 else self.share)
 
     def _newton(
         self, equation: _Equation, y: np.ndarray, configuration: Configuration, stride: float | None
