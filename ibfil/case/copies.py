@@ -48,6 +48,11 @@ class Copies(Table):
         return isinstance(self.phase, str)
 
 
+def number_of(copy: str) -> int:
+    """The number of a copy from its name."""
+    return int(copy.rpartition("_")[2])
+
+
 def copy_name(name: str, number: int) -> str:
     """The name of copy ``number``, from 0 on, of a filament: NAME_003."""
     return f"{name}_{number:03d}"

@@ -90,6 +90,9 @@ class Output(Table):
         ("velocity",), description="which fields"
     )
     grid_stride: Count = Field(1, description="every so many cells of a field")
+    copies_every: Count = Field(
+        1, description="every so many-th copy of a filament is written, and observed; all are computed"
+    )
     window: Sizes | None = Field(None, description="sides of the part of free space whose fields are written")
     window_at: Vector | None = Field(
         None, description="its middle; the origin by default, or such that it stands on the wall"

@@ -52,6 +52,8 @@ def _section(title: str, lines: list[str]) -> list[str]:
     return [f"{title}:", *(f"  {line}" for line in lines), ""]
 
 
+MANY = 2000  # filaments, each of which has datasets of its own
+
 _MOTIONS = {"moves": "prescribed motion", "spin": "spin", "angle": "prescribed turn"}
 
 
@@ -167,6 +169,13 @@ def _bytes(count: float) -> str:
     return f"{count:.3g} GiB"
 
 
+def _many_written(written: int) -> list[str]:
+    """How to write less, where each output has very many filaments."""
+    if written <= MANY:
+        return []
+    return [f"an output of {written} filaments takes long to write: output.copies_every writes every so many-th copy"]
+
+
 def _costs(simulation: Simulation) -> list[str]:
     case, fluid = simulation.case, simulation.model.fluid_model
     unknowns = simulation.system.unknowns
@@ -176,7 +185,10 @@ def _costs(simulation: Simulation) -> list[str]:
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
     lines += fluid.remarks()
-    lines.append(f"disk at most {_bytes(disk(simulation))}, fields compressed")
+    written = len(simulation.rods.written(case.output.copies_every))
+    some = "" if written == len(simulation.rods.names) else f", of {written} of {len(simulation.rods.names)} filaments"
+    lines.append(f"disk at most {_bytes(disk(simulation))}{some}, fields compressed")
+    lines += _many_written(written)
     methods = simulation.model.seconds
     if len(methods) > 1:
         others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
