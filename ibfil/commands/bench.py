@@ -12,7 +12,9 @@ NAME, HELP = "bench", "time the pieces of a step against floors measured in the 
 
 def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
-    words = "pieces, swimmer (the usual two), start, spaces, thermal, links, body, large, threads, many, members"
+    words = (
+        "pieces, swimmer (the usual two), start, spaces, thermal, links, body, large, threads, many, members, million"
+    )
     command.add_argument("parts", nargs="*", metavar="PART", help=words)
     command.add_argument("--json", action="store_true", help="as JSON")
 

@@ -95,13 +95,19 @@ def _substitute(lu, start, at, rows, units, right, out):
 Parts = Callable[[], Iterable[tuple[np.ndarray, np.ndarray]]]  # the unknowns (k,) and the system (k, k) of each block
 
 
+def bytes_of(sizes: Iterable[int]) -> float:
+    """The bytes of the factors of square blocks of ``sizes``: many are kept in single precision."""
+    double = 8.0 * sum(float(n) ** 2 for n in sizes)
+    return double if double <= _LARGE else 0.5 * double
+
+
 def factored(parts: Parts, sizes: Sequence[int], held: np.ndarray, units: np.ndarray | None = None) -> Blocks:
     """The factors of square blocks of ``sizes``, by the unknowns each stands for, given transposed; overwrites them.
 
     ``units`` (n,) are those of moves; None: one. Many are kept in single precision, as a preconditioner may be, unless
     one of them is so stiff that this would make it another. ``parts`` may be asked again.
     """
-    large = 8 * sum(n * n for n in sizes) > _LARGE
+    large = bytes_of(sizes) < 8.0 * sum(float(n) ** 2 for n in sizes)
     found = _factored(parts(), sizes, held, units, np.float32) if large else None
     return found or _factored(parts(), sizes, held, units, np.float64)  # type: ignore[return-value]
 

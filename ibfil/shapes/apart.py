@@ -110,9 +110,17 @@ def _keep(points, cells, width, last, known, before, owner, count, curve):
         known[p], before[p], owner[p], last[at] = points[q], last[at], curve, p
 
 
-def _fine(r: np.ndarray, spacing: float) -> np.ndarray:
+@njit(cache=True)
+def _fine(r, spacing):
     """Points (n, 3) on the polygon of nodes ``r`` (N, 3), at most ``spacing`` from each other."""
-    edges = np.linalg.norm(np.diff(r, axis=0), axis=1)
-    counts = np.maximum(np.ceil(edges / spacing), 1).astype(int)
-    parts = [a + np.outer(np.arange(n) / n, b - a) for a, b, n in zip(r[:-1], r[1:], counts, strict=True)]
-    return np.concatenate([*parts, r[-1:]])
+    counts = np.ones(len(r), np.int64)
+    for i in range(len(r) - 1):
+        a, b, c = r[i + 1, 0] - r[i, 0], r[i + 1, 1] - r[i, 1], r[i + 1, 2] - r[i, 2]
+        counts[i] = max(1, int(np.ceil(np.sqrt(a * a + b * b + c * c) / spacing)))
+    out, k = np.empty((counts.sum(), 3)), 0
+    for i in range(len(r)):
+        for part in range(counts[i]):
+            for x in range(3):
+                out[k, x] = r[i, x] + (part / counts[i] * (r[i + 1, x] - r[i, x]) if part else 0.0)
+            k += 1
+    return out

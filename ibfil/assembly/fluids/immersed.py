@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...linalg.gmres import bytes_of
 from .. import costs
 from .. import grid as grids
 from ..drag import drag
@@ -200,7 +201,7 @@ class ImmersedModel(FluidModel):
         out = {"mobility table": self._number * self.table_entries()}
         if method == "krylov":
             band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
-            out["preconditioner"] = sum(8.0 * (self.components * k) ** 2 for k in rods.group_sizes) + 2 * band
+            out["preconditioner"] = bytes_of(self.components * k for k in rods.group_sizes) + 2 * band
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
             out["dense matrices"] = costs.dense_bytes(n, self.components)
