@@ -52,6 +52,7 @@ def _section(title: str, lines: list[str]) -> list[str]:
     return [f"{title}:", *(f"  {line}" for line in lines), ""]
 
 
+LARGE = 50_000  # nodes, beyond which some hundred velocities are no matter of seconds
 MANY = 2000  # filaments, each of which has datasets of its own
 
 _MOTIONS = {"moves": "prescribed motion", "spin": "spin", "angle": "prescribed turn"}
@@ -169,13 +170,6 @@ def _bytes(count: float) -> str:
     return f"{count:.3g} GiB"
 
 
-def _many_written(written: int) -> list[str]:
-    """How to write less, where each output has very many filaments."""
-    if written <= MANY:
-        return []
-    return [f"an output of {written} filaments takes long to write: output.copies_every writes every so many-th copy"]
-
-
 def _costs(simulation: Simulation) -> list[str]:
     case, fluid = simulation.case, simulation.model.fluid_model
     unknowns = simulation.system.unknowns
@@ -188,7 +182,8 @@ def _costs(simulation: Simulation) -> list[str]:
     written = len(simulation.rods.written(case.output.copies_every))
     some = "" if written == len(simulation.rods.names) else f", of {written} of {len(simulation.rods.names)} filaments"
     lines.append(f"disk at most {_bytes(disk(simulation))}{some}, fields compressed")
-    lines += _many_written(written)
+    if written > MANY:
+        lines.append(f"outputs of {written} filaments take long: output.copies_every writes every so many-th copy")
     methods = simulation.model.seconds
     if len(methods) > 1:
         others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
@@ -231,7 +226,9 @@ def _steps(simulation: Simulation) -> list[str]:
     if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
         lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
     limit = "not with bodies" if case.bodies else "not with mass"
-    if not case.heavy and not case.bodies:
+    if simulation.rods.count > LARGE:
+        limit = f"its limit is not looked for beyond {LARGE} nodes"
+    elif not case.heavy and not case.bodies:
         limit = f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)"
     return [
         *lines,

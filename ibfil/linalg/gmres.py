@@ -122,7 +122,8 @@ def _factored(
     """The same in precision ``number``; None where single precision does not serve."""
     start = np.concatenate([[0], np.cumsum(sizes)])
     n, place = int(start[-1]), 0
-    lu, at, rows = np.empty(sum(k * k for k in sizes), number), np.empty(n, np.int64), np.empty(n, np.int64)
+    lu: np.ndarray = np.empty(sum(k * k for k in sizes), number)
+    at, rows = np.empty(n, np.int64), np.empty(n, np.int64)
     scale, diagonal = np.ones(n) if units is None else units.copy(), np.empty(n)
     every = np.ones(n) if units is None else units
     for b, (unknowns, system) in enumerate(parts):

@@ -23,8 +23,8 @@ class Kept:
         self._sides = None if sides is None else np.asarray(sides, float)
         # So many cells a side; without a box space is folded to one of as many cells: two points far apart may share
         # one, which their distance tells.
-        self._cells = np.full(3, _FOLDED) if sides is None else _cells(self._sides / self._least)
-        self._width = np.full(3, self._least) if sides is None else self._sides / self._cells
+        self._cells = np.full(3, _FOLDED) if sides is None else _cells(np.asarray(sides, float) / self._least)
+        self._width = np.full(3, self._least) if sides is None else np.asarray(sides, float) / self._cells
         self._last = np.full(int(np.prod(self._cells)), -1)  # the last point in each cell
         self._points = np.empty((0, 3))
         self._before = np.empty(0, np.int64)  # the point before in the same cell

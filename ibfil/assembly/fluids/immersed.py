@@ -200,8 +200,8 @@ class ImmersedModel(FluidModel):
         n, m, method = rods.count + self.markers(), rods.system.unknowns, self.method(rods)
         out = {"mobility table": self._number * self.table_entries()}
         if method == "krylov":
-            band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
-            out["preconditioner"] = bytes_of(self.components * k for k in rods.group_sizes) + 2 * band
+            kept = 2 * 8.0 * n * m * m * (2 * rods.system.profile.width + 1)  # the stiffness of factors, and a copy
+            out["preconditioner"] = bytes_of(self.components * k for k in rods.group_sizes) + kept
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
             out["dense matrices"] = costs.dense_bytes(n, self.components)

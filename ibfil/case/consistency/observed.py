@@ -34,7 +34,7 @@ def _observe(case: Scene) -> Iterator[Fault]:
 
 
 def _unwritten(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
-    """What looks at copies that are not written."""
+    """Faults of what looks at copies that are not written."""
     every, reads = case.output.copies_every, ("output.copies_every",)
     if entry.pumps and any(filament.copies for filament in case.filaments.values()):
         yield Fault(f"{key}.kind", f"{shown(entry.kind)}, which takes all copies", "output.copies_every = 1", reads)
