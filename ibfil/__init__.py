@@ -12,6 +12,7 @@ has a README.md with its equations, its files in reading order, and how to add a
     rods           strains, laws, the force of Eq. 44 and its Jacobian, loads, contact: `system` is the whole
     bodies         rigid bodies that ends of rods are in, motors: levers, balances, rows beside the nodes
     fluids         u = u0 + M F over a step: resistive-force theory, Stokes and Navier-Stokes on the grid
+    parallel       the grid of one run shared by the processes of mpiexec
     timestepping   y = target + tau (u0 + M (f(y) + R)): explicit, semi-implicit, implicit, thermal; step control
 
     case           what a scene may say: the TOML file, checked

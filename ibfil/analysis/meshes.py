@@ -14,15 +14,27 @@ from .periodic_images import Pieces, unwrapped, wrapped
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkDataSet
 
+    from ..case.filament import Filament
+    from ..case.schema import Case
     from ..io.reader import RunFile
     from ..io.snapshots import FilamentSnapshot, Snapshot
 
 
 class View(NamedTuple):
-    """How filaments are shown: brought into the periodic box, and their images in so many boxes on each side."""
+    """How a scene is shown: brought into the periodic box, and its images in so many boxes on each side."""
 
     wrap: bool = False
     images: int = 0
+
+    @property
+    def shifts(self) -> np.ndarray:
+        """Which boxes (k, 3) are shown, that of the scene itself first."""
+        every = product(range(-self.images, self.images + 1), repeat=3)
+        return np.array(sorted(every, key=lambda shift: shift != (0, 0, 0)))
+
+    def brought(self, centre: np.ndarray, box: np.ndarray) -> np.ndarray:
+        """The places (.., 3), in the box (3,) about the origin where the scene is wrapped."""
+        return centre - box * np.floor(centre / box + 0.5) if self.wrap else centre
 
 
 PLAIN = View()
@@ -36,20 +48,20 @@ class Rod(NamedTuple):
 
 
 def rods_of(run: RunFile) -> dict[str, Rod]:
-    """All filaments of a run by name.
+    """All filaments of a run by name."""
+    return {name: rod_of(run.case, run.filament(name), run.arclength(name)) for name in run.filaments}
+
+
+def rod_of(case: Case, filament: Filament, s: np.ndarray) -> Rod:
+    """A filament with nodes at the arclengths ``s`` (N,).
 
     The tube is the material radius where the case gives one; else the hydrodynamic radius that the grid gives a line;
     else, under rft, a hundredth of the length.
     """
-    return {name: Rod(run.arclength(name), _radius(run, name)) for name in run.filaments}
-
-
-def _radius(run: RunFile, name: str) -> np.ndarray:
-    s, filament = run.arclength(name), run.filament(name)
     if filament.radius is not None:
-        return np.broadcast_to(np.asarray(filament.radius.bind("s")(s), float), s.shape)
-    radius = fluid_model(run.case).line_radius
-    return np.full(s.shape, 0.01 * filament.length if radius is None else radius)
+        return Rod(s, np.broadcast_to(np.asarray(filament.radius.bind("s")(s), float), s.shape))
+    radius = fluid_model(case).line_radius
+    return Rod(s, np.full(s.shape, 0.01 * filament.length if radius is None else radius))
 
 
 def filament_data(run: RunFile, output: int, view: View = PLAIN) -> vtkDataSet:
@@ -76,10 +88,10 @@ def box_of(run: RunFile) -> np.ndarray | None:
 
 
 def directors(position: np.ndarray, e1: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """e2 and e3 (N, 3) of a filament: e3 is its tangent by central differences, made normal to e1 (N, 3)."""
-    tangent = np.gradient(position, s, axis=0, edge_order=2)
-    tangent = tangent - np.sum(tangent * e1, axis=1, keepdims=True) * e1
-    e3 = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
+    """e2 and e3 (..., N, 3) of a filament: e3 is its tangent by central differences, made normal to e1 (..., N, 3)."""
+    tangent = np.gradient(position, s, axis=-2, edge_order=2)
+    tangent = tangent - np.sum(tangent * e1, axis=-1, keepdims=True) * e1
+    e3 = tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
     return np.cross(e3, e1), e3
 
 
@@ -111,25 +123,29 @@ def polylines(
 
     Wrapped ones are cut at the faces of the box, with points there; images carry which box they are in (``image``).
     """
-    if box is None and view != PLAIN:
-        raise ValueError("periodic images and wrapping need a box, and this run has none")
-    box = np.zeros(3) if box is None else box
+    box = known_box(box, view)
     points: list[np.ndarray] = []
     arrays: list[dict[str, np.ndarray]] = []
     lengths: list[int] = []
-    shifts = sorted(product(range(-view.images, view.images + 1), repeat=3), key=lambda shift: shift != (0, 0, 0))
     for number, (name, rod) in enumerate(rods.items()):
         filament = snapshot.filaments[name]
         pieces = wrapped(filament.position, -0.5 * box, box) if view.wrap else unwrapped(len(rod.s))
         own = pieces.take(filament.position) - pieces.image * box
-        shown = _on(pieces, _node_arrays(filament, rod))
+        shown = _on(pieces, node_arrays(filament, rod))
         shown["filament"] = np.full(len(own), number, np.int32)
-        for shift in shifts:
-            points.append(own + np.array(shift) * box)
-            more = {"image": np.tile(np.array(shift, np.int32), (len(own), 1))} if view.images else {}
+        for shift in view.shifts:
+            points.append(own + shift * box)
+            more = {"image": np.tile(shift.astype(np.int32), (len(own), 1))} if view.images else {}
             arrays.append(shown | more)
             lengths += pieces.lengths
     return _poly_data(np.concatenate(points), lengths, arrays, snapshot.time)
+
+
+def known_box(box: np.ndarray | None, view: View) -> np.ndarray:
+    """The periodic box (3,), zero where there is none. Raises ValueError where ``view`` asks for one."""
+    if box is None and view != PLAIN:
+        raise ValueError("periodic images and wrapping need a box, and this run has none")
+    return np.zeros(3) if box is None else box
 
 
 def wall_plane(run: RunFile) -> vtkDataSet | None:
@@ -151,23 +167,30 @@ def wall_plane(run: RunFile) -> vtkDataSet | None:
     return plane.GetOutput()
 
 
-def link_lines(snapshot: Snapshot) -> vtkDataSet:
-    """All links at one time as vtkPolyData: a line an element, from point to point, where they are unwrapped.
+def link_lines(snapshot: Snapshot, box: np.ndarray | None = None, view: View = PLAIN) -> vtkDataSet:
+    """All links at one time as vtkPolyData: a line an element, from point to point.
 
     At both points: the size of its force (``link_force``), the force on that point (``force``), the number of the link
-    and ``tension``, ``slide`` and ``shear``, no number where its kind has none.
+    and ``tension``, ``slide`` and ``shear``, no number where its kind has none. Wrapped lines are whole, with their
+    middle in the periodic box; images carry which box they are in (``image``).
     """
+    box = known_box(box, view)
     points: list[np.ndarray] = []
     arrays: list[dict[str, np.ndarray]] = []
     for number, link in enumerate(snapshot.links.values()):
-        points.append(np.stack([link.first, link.second], axis=1).reshape(-1, 3))
+        middle = 0.5 * (link.first + link.second)
+        ends = np.stack([link.first, link.second], axis=1) + (view.brought(middle, box) - middle)[:, None]
         count, vectors = len(link.first), np.stack([-link.force, link.force], axis=1).reshape(-1, 3)
         size = np.linalg.norm(vectors, axis=1)
         shown = {"link_force": size, "force": vectors, "link": np.full(2 * count, number, np.int32)}
         for name in ("tension", "slide", "shear"):
             values = getattr(link, name)
             shown[name] = np.repeat(np.full(count, np.nan) if values is None else values, 2)
-        arrays.append({k: v if v.dtype == np.int32 else v.astype(np.float32) for k, v in shown.items()})
+        shown = {k: v if v.dtype == np.int32 else v.astype(np.float32) for k, v in shown.items()}
+        for shift in view.shifts:
+            points.append(ends.reshape(-1, 3) + shift * box)
+            more = {"image": np.tile(shift.astype(np.int32), (2 * count, 1))} if view.images else {}
+            arrays.append(shown | more)
     whole = np.concatenate(points)
     return _poly_data(whole, [2] * (len(whole) // 2), arrays, snapshot.time)
 
@@ -194,18 +217,14 @@ def _poly_data(
     data.SetPoints(nodes)
     data.SetLines(lines)
     for key in arrays[0]:
-        _add(data.GetPointData(), key, np.concatenate([shown[key] for shown in arrays]))
-    _add(data.GetFieldData(), "TimeValue", np.array([time]))
+        add_array(data.GetPointData(), key, np.concatenate([shown[key] for shown in arrays]))
+    add_array(data.GetFieldData(), "TimeValue", np.array([time]))
     return data
 
 
-def _node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
-    """The arrays of one filament as they appear in ParaView, all with N rows.
-
-    Tension lives on segments: a node shows the mean of its two, an end its only one.
-    """
+def node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
+    """The arrays of one filament as they appear in ParaView, all with N rows; over several times (T, N, ...)."""
     e2, e3 = directors(filament.position, filament.e1, rod.s)
-    tension = filament.tension
     return {
         "velocity": filament.velocity,
         "force": filament.force,
@@ -214,10 +233,15 @@ def _node_arrays(filament: FilamentSnapshot, rod: Rod) -> dict[str, np.ndarray]:
         "e1": filament.e1,
         "e2": e2,
         "e3": e3,
-        "tension": 0.5 * (np.append(tension[0], tension) + np.append(tension, tension[-1])),
+        "tension": at_nodes(filament.tension),
         "tube_radius": rod.radius,
         "arclength": rod.s,
     }
+
+
+def at_nodes(tension: np.ndarray) -> np.ndarray:
+    """The tension (..., N) of nodes from that of segments (..., N - 1): the mean of its two, of an end its only one."""
+    return 0.5 * (np.append(tension[..., :1], tension, axis=-1) + np.append(tension, tension[..., -1:], axis=-1))
 
 
 def image(fields: dict[str, np.ndarray], origin: np.ndarray, spacing: np.ndarray, time: float) -> vtkDataSet:
@@ -234,13 +258,13 @@ def image(fields: dict[str, np.ndarray], origin: np.ndarray, spacing: np.ndarray
     for name, values in fields.items():
         data.SetDimensions(*values.shape[:3])
         ordered = values.transpose(2, 1, 0, *range(3, values.ndim))
-        _add(data.GetPointData(), name, ordered.reshape(-1, *values.shape[3:]).astype(np.float32))
-    _add(data.GetFieldData(), "TimeValue", np.array([time]))
+        add_array(data.GetPointData(), name, ordered.reshape(-1, *values.shape[3:]).astype(np.float32))
+    add_array(data.GetFieldData(), "TimeValue", np.array([time]))
     return data
 
 
-def _add(attributes: Any, name: str, values: np.ndarray) -> None:
-    """Put an array (n,) or (n, 3) into point or field data, under a name that ParaView can take."""
+def add_array(attributes: Any, name: str, values: np.ndarray) -> None:
+    """Puts an array (n,) or (n, 3) into point or field data, under a name that ParaView can take."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
 
     array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)

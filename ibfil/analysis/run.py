@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import CaseError
+from ..io.datasets import ALONG_FRAME
 from ..io.reader import RunFile
 
 if TYPE_CHECKING:
@@ -130,20 +131,23 @@ class Run(RunFile):
     def to_xarray(self) -> xarray.Dataset:
         """All but the fields as one dataset, read whole: NAME_position (time, NAME_node, xyz) ..., links, observables.
 
-        Nodes are found by arclength, ``sel(NAME_arclength=0.5, method="nearest")``. Each variable carries its units and
-        description. Raises ImportError where xarray is not installed.
+        Nodes are found by arclength, ``sel(NAME_arclength=0.5, method="nearest")``. Moments and strains of filaments
+        have components along the frame, ``sel(frame="e1")``. Each variable carries its units and description. Raises
+        ImportError where xarray is not installed.
         """
         import xarray
 
         variables: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}
         coordinates = {"time": ("time", self.time, {"units": self.units("time")}), "xyz": ("xyz", list("xyz"))}
+        coordinates["frame"] = ("frame", ["e1", "e2", "e3"])
         for name, columns in self.filaments.items():
             node, length = f"{name}_node", self.case.units.length
             s = self.arclength(name)
             coordinates[f"{name}_arclength"] = (node, s, {"units": length})
             for key, column in columns.items():
                 along = () if key.startswith("reaction") else (f"{name}_segment" if key == "tension" else node,)
-                last = ("xyz",) if len(column.shape) > 1 + len(along) else ()
+                parts = "frame" if key in ALONG_FRAME else "xyz"
+                last = (parts,) if len(column.shape) > 1 + len(along) else ()
                 variables[f"{name}_{key}"] = (("time", *along, *last), np.asarray(column), self._about(name, key))
         for name, columns in self.links.items():
             for key, column in columns.items():
@@ -169,6 +173,8 @@ class Run(RunFile):
             for name, columns in found.items():
                 for key, column in columns.items():
                     path, dims = f"{group}/{name}/{key}", ("time", "xyz")[: len(column.shape)]
+                    if len(column.shape) > 2:
+                        dims = ("time", f"{name}_marker", "xyz")
                     about = {"units": self.units(path), "description": self.description(path)}
                     out[f"{name}_{before}{key}"] = (dims, np.asarray(column), about)
         return out

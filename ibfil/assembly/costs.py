@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..case.schema import Case
 
@@ -20,12 +20,15 @@ SPREAD = 1.0e-6  # a node for spreading and interpolating, 4-point kernel
 _PAIR = 0.8e-6  # a pair of nodes in the mobility table, 4-point kernel
 _COMPONENTS = 2.5  # the same of a table with torques, of one without
 _FLOP = 1.0e-10  # a floating-point operation in dense matrices, and in sums over planes
+_LARGE_FLOP = 3.0e-11  # the same in products and triangular solves of large ones
 _MODE = 0.8e-9  # a number through one pass of an FFT, times the logarithm of its length
 _ELEMENT = 1.0e-5  # an element of a link for its force and stiffness
 _ROUNDS = {"explicit": 1, "semi-implicit": 1, "implicit": 3}  # Newton iterations
 _THERMAL = 1.8  # of a semi-implicit step of the rods, one with thermal forces: a second force, a second solve
 _NORMAL = 1.6e-8  # a normal number
 _PRODUCTS = 11  # of GMRES with a preconditioner rod by rod, an iteration of Newton
+_GIVEN = 12  # products that find what swimmers give each other, an iteration of Newton
+_SWIMMER = 8e-4  # a swimmer's own answer to what comes to it
 _LARGEST = 2.0**30  # bytes that the table's dense matrices may take before the table is out of the question
 
 
@@ -114,10 +117,26 @@ def without_box(case: Case, rods: Sequence[int], parts: int, whole: float, pair:
     return found
 
 
-def with_markers(case: Case, nodes: int, markers: int, parts: int, pair: float = 1.0) -> float:
-    """Seconds of one step by the table with markers of bodies, which are taken out of it once a step."""
-    rods, shell = solved(nodes, parts), _root(markers, 3) + 6.0 * markers * 3 * (parts * nodes) ** 2 * _FLOP
-    return of_rods(case, nodes) + pair * _table(nodes + markers, parts) + shell + _ROUNDS[case.time.scheme] * rods
+def with_markers(
+    case: Case, counts: Sequence[tuple[int, int]], parts: int, evaluations: Mapping[str, float], pair: float = 1.0
+) -> dict[str, float]:
+    """Seconds of a step with bodies by each method; ``counts`` are the nodes and markers of each swimmer.
+
+    Markers are taken out once a step, of all or of each swimmer; velocities come from the table, or by transforms,
+    ``evaluations`` the seconds of one each.
+    """
+
+    def made(nodes: int, markers: int) -> float:
+        m, n = 3.0 * markers, float(parts) * nodes
+        shell = (0.35 * m**3 + m**2 * n + 2 * m * n**2) * _LARGE_FLOP
+        return pair * _table(nodes + markers, parts) + shell + rounds * solved(nodes, parts)
+
+    nodes, markers = (sum(numbers) for numbers in zip(*counts, strict=True))
+    rounds, local = _ROUNDS[case.time.scheme], of_rods(case, nodes)
+    exact = local + made(nodes, markers) if dense_bytes(nodes + markers, parts) < _LARGEST else np.inf
+    found = {"table": exact} | {name: exact + 2 * rounds * one for name, one in evaluations.items()}
+    each = min(evaluations.values()) + _SWIMMER * len(counts)
+    return found | {"krylov": local + sum(made(*one) for one in counts) + _GIVEN * rounds * each}
 
 
 def _table(nodes: int, parts: int) -> float:

@@ -104,7 +104,7 @@ def body_drag(case: Case, stacked: RodStack) -> BodyDrag:
     from ..fluids.resistive_bodies import BodyDrag
 
     found = []
-    for body in case.bodies.values():
+    for body in case.each_body.values():  # a cloud has the resistance that is given, and in flows no size
         size, given = np.array(body.shape.semi_axes), body.resistance
         if given is not None:
             found.append(Resistance(np.array(given.translation), np.array(given.rotation), size))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def rod_system(filament: Filament) -> type[RodSystem]:
     """Eq. 44, or its torque-free form."""
     if filament.force == "torque-free":
-        from ..rods.torque_free import TorqueFree
+        from ..rods.torque_free.mechanics import TorqueFree
 
         return TorqueFree
     return RodSystem

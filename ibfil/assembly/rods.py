@@ -29,7 +29,7 @@ from .kinds import rod_system
 from .loads import loads
 from .profiles import along, half
 from .rest import settled
-from .stacked import RodStack
+from .stacked import Copied, RodStack
 
 if TYPE_CHECKING:
     from ..case.copies import Copies
@@ -54,6 +54,7 @@ class Placed(NamedTuple):
     r: np.ndarray
     e1: np.ndarray
     held: Tangents
+    copied: Copied | None = None
 
 
 class _Stacked(NamedTuple):
@@ -119,9 +120,10 @@ def _copies(case: Case, table: str, filament: Filament, many: Copies) -> Iterato
     curve = None if many.apart is None else lambda number, values: own(number, values).r - about
     for place in copies.places(many, key, folder, curve, sides):
         it, turn = own(place.number, place.values), place.turn
-        moved = (it.r - about) @ turn.T + place.point
+        copied = Copied(turn, about, place.point)
         first, last = (None if t is None else turn @ t for t in it.held)
-        yield it._replace(name=copy_name(table, place.number), r=moved, e1=it.e1 @ turn.T, held=(first, last))
+        name, r, e1 = copy_name(table, place.number), copied.place(it.r), it.e1 @ turn.T
+        yield it._replace(name=name, r=r, e1=e1, held=(first, last), copied=copied)
 
 
 def _own(case: Case, table: str, number: int, filament: Filament, values: Mapping[str, float]) -> Filament:
@@ -138,10 +140,20 @@ def _own(case: Case, table: str, number: int, filament: Filament, values: Mappin
 
 
 def _centre(case: Case, name: str) -> tuple[float, float, float]:
-    """The point about which a filament is copied: its position, or that of the first of all that are linked to it."""
+    """The point about which a filament is copied: its position, or that of the first of all that are joined to it.
+
+    Filaments are joined by links, and by bodies that they are in.
+    """
+    together = [set(link.names) for link in case.links.values()]
+    in_body: dict[str, set[str]] = {}
+    for own, filament in case.filaments.items():
+        for end in (filament.start, filament.finish):
+            if end.attached:
+                in_body.setdefault(end.body, set()).add(own)
+    together += in_body.values()
     joined, more = {name}, True
     while more:
-        found = {other for link in case.links.values() if joined & set(link.names) for other in link.names}
+        found = {other for names in together if joined & names for other in names}
         more = not found <= joined
         joined |= found
     return next(filament.position for other, filament in case.filaments.items() if other in joined)
@@ -209,11 +221,11 @@ def rods(case: Case, given: Mapping[str, MomentLaw] = MappingProxyType({})) -> R
     start = system.start(r, e1)
     for part in system.remembering:
         part.start(start)
-    tables = tuple(p.table for p in placed)
-    out = RodStack(names, tables, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined))
+    known = names, filaments, tuple(nodes), tuple(ranges), s, system, start, touching, tuple(joined)
+    out = RodStack(*known, tables=tuple(p.table for p in placed), copied=tuple(p.copied for p in placed))
     if not case.bodies:
         return out
-    from .bodies import with_bodies
+    from .bodies.system import with_bodies
 
     return with_bodies(case, out)
 

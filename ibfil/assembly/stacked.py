@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -25,6 +25,18 @@ if TYPE_CHECKING:
 TOGETHER = 500  # nodes of linked filaments that a preconditioner takes as one block
 
 
+class Copied(NamedTuple):
+    """Where a copy goes: it is turned (3, 3) ``about`` a point (3,), which then goes to ``point`` (3,)."""
+
+    turn: np.ndarray
+    about: np.ndarray
+    point: np.ndarray
+
+    def place(self, r: np.ndarray) -> np.ndarray:
+        """Places (.., 3) of the filament, in its copy."""
+        return (r - self.about) @ self.turn.T + self.point
+
+
 @dataclass(frozen=True)
 class RodStack:
     """The rods of a scene: names and node ranges of its filaments, arclength (n,), links, and all their mechanics.
@@ -33,7 +45,6 @@ class RodStack:
     """
 
     names: tuple[str, ...]
-    tables: tuple[str, ...]  # the names that the case gives them: of copies one
     filaments: tuple[Filament, ...]
     nodes: tuple[slice, ...]
     ranges: tuple[slice, ...]  # the same, with the copies beyond the ends of closed rods (rods/closed.py)
@@ -44,6 +55,8 @@ class RodStack:
     links: tuple[Link, ...] = ()
     bodies: tuple[str, ...] = ()
     motors: tuple[str, ...] = ()
+    tables: tuple[str, ...] = field(kw_only=True)  # the names that the case gives them: of copies one
+    copied: tuple[Copied | None, ...] = field(kw_only=True)  # where copies went, of each filament
 
     @property
     def count(self) -> int:

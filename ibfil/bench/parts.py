@@ -12,10 +12,12 @@ from . import linked as bench_linked
 from . import many as bench_many
 from . import members as bench_members
 from . import pieces
+from . import processes as bench_processes
 from . import spaces as bench_spaces
 from . import swimming as bench_swimming
 from . import thermal as bench_thermal
 from . import threads as bench_threads
+from . import whole_studies as bench_studies
 from .timing import Row, table
 
 
@@ -82,10 +84,12 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "large": lambda: [pieces.inertia(128), *pieces.evaluations(256, (1.3, 1 / 6))],
     "links": lambda: [*bench_linked.linked(6, (280.0, None)), *bench_linked.linked(2, (165.0, None))],
     "body": lambda: bench_swimming.heads(),
+    "studies": lambda: bench_studies.costs(),
     "threads": threads,
     "many": lambda: many(),
     "million": lambda: million(),
     "members": lambda: bench_members.members(),
+    "mpi": lambda: bench_processes.measured(),
 }
 USUAL = ("pieces", "swimmer")
 

@@ -20,6 +20,7 @@ class Body:
 
     ``moves`` and ``turns`` give its displacement and its rotation vector since t = 0, in the lab; None where it is free
     to move, or to turn. ``force`` and ``torque`` are external, along its axes where ``own_axes``.
+    ``cloud`` (k, 3) are its markers in its axes, where these are given.
     """
 
     centre: np.ndarray
@@ -29,6 +30,7 @@ class Body:
     force: OfTime | None = None
     torque: OfTime | None = None
     own_axes: bool = False
+    cloud: np.ndarray | None = None
 
     def moved(self, before: float, after: float) -> np.ndarray:
         """The displacement (3,) between two times, where that is given."""

@@ -62,7 +62,8 @@ def bordered(
     loads, by_each = _outside(carried, first, each)
     matrix = own.by_each + np.diag(carried.drag) / tau - carried.slope
     matrix = matrix + carried.balance @ by_each.reshape(p, -1).T
-    short = carried.want - carried.balance @ loads.ravel() - own.force - carried.drag * rate
+    with np.errstate(invalid="ignore"):  # of a load that has no value, which the step tells
+        short = carried.want - carried.balance @ loads.ravel() - own.force - carried.drag * rate
     if supports is not None:
         matrix, short = matrix + supports.by_each, short - supports.now
     found = carried.by[:, None] == held.at
@@ -77,9 +78,10 @@ def bordered(
 def _outside(carried: Carried, first: Done, each: Done) -> tuple[np.ndarray, np.ndarray]:
     """The felt forces less the loads from outside: (n, m), and (p, n, m) a unit of each unknown."""
     loaded, by_each = carried.external, each.felt - carried.external_columns.transpose(2, 0, 1)
-    if carried.external_change is not None:
-        loaded = loaded + carried.external_change(first.moves)
-        by_each = by_each - np.array([carried.external_change(x) for x in each.moves])
+    if carried.external_stiffness is not None:
+        follows = carried.external_stiffness.times
+        loaded = loaded + follows(first.moves)
+        by_each = by_each - np.array([follows(x) for x in each.moves]).reshape(by_each.shape)
     return first.felt - loaded, by_each
 
 
@@ -90,5 +92,5 @@ def frozen(carried: Carried) -> Carried:
         zero = np.zeros_like(clamps.by_tangents)
         clamps = clamps._replace(by_nodes=np.zeros_like(clamps.by_nodes), by_tangents=zero)
     columns, slope = np.zeros_like(carried.columns), np.zeros_like(carried.slope)
-    still = carried._replace(columns=columns, external_columns=columns, external_change=None)
+    still = carried._replace(columns=columns, external_columns=columns, external_stiffness=None)
     return still._replace(slope=slope, clamps=clamps)

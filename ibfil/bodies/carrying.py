@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..linalg.constraints import Carried, Clamps, Prescribed
+from ..linalg.stiffness import Stiffness
 from ..rods.base import Load
 from ..rods.elastic_force import Moment
 from ..rods.geometry import Configuration
@@ -20,8 +21,6 @@ from .end_tangents import EndTangents
 from .rotation import turning
 from .rows import Rows
 from .supports import Supports
-
-Change = Callable[[np.ndarray], np.ndarray]
 
 
 class Joined(NamedTuple):
@@ -120,12 +119,12 @@ class Carrying:
 
     def _external(
         self, rods: Configuration, begin: Configuration, time: float, tangents: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, Change | None, np.ndarray]:
+    ) -> tuple[np.ndarray, Stiffness | None, np.ndarray]:
         """The loads from outside (n, m), how they change with nodes, and with q through tangents (n, m, p)."""
         shape, joined = (self.rows.n, self.rows.m), self.joined
         if not joined.outside:
             return np.zeros(shape), None, np.zeros((*shape, self.q.size))
-        change = joined.rods.stiffness_of_loads(joined.outside, rods, begin, time).times
+        change = joined.rods.stiffness_of_loads(joined.outside, rods, begin, time)
         filled = joined.tangents.begin(rods, begin, self.rows.m)
         for load in joined.outside:
             load.add_stiffness(time, filled)

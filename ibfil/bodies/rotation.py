@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..linalg.compiled import njit
 
 _SMALL = 1e-4  # radians: below, the series to fourth order is exact to round-off
 

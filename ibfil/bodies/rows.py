@@ -22,6 +22,8 @@ from .body import Body, Motor, Poses
 from .rotation import turned
 
 E3 = np.array([0.0, 0.0, 1.0])
+_TURNED = np.array([[0, 1, 2, 2], [1, 2, 0, 0]])  # which axes of a body are e1, e2, e3 and r' of its two rows
+_LAB = np.eye(3)[_TURNED[0]].ravel()
 
 
 class Rows:
@@ -62,18 +64,13 @@ class Rows:
 
     def appended(self, rods: Configuration, poses: Poses) -> Configuration:
         """The configuration of N rows: of the rods, and of bodies and motors."""
-        table = np.zeros((self.count, rods.table.shape[1]))
+        table, end = np.zeros((self.count, rods.table.shape[1])), self.n + 2 * len(self.bodies)
         table[: self.n] = rods.table
-        rest = Configuration(table[self.n :])
-        rest.metric[:] = rest.length[:] = 1.0
-        rest.e1[:], rest.e2[:], rest.e3[:] = np.eye(3)
-        end = 2 * len(self.bodies)
-        rest.r[0:end:2] = rest.r[1:end:2] = poses.centre
-        e1, e2, e3 = (poses.axes[:, :, c] for c in range(3))
-        rest.e1[0:end:2], rest.e2[0:end:2], rest.e3[0:end:2] = e1, e2, e3
-        rest.e1[1:end:2], rest.e2[1:end:2], rest.e3[1:end:2] = e2, e3, e1
-        rest.r_s[:] = rest.e3
-        rest.table[end:, geometry.R] = poses.angle * self.length
+        directors = slice(geometry.E1, geometry.R_S + 3)  # e1, e2, e3, and r' as e3
+        table[self.n : end, geometry.R : geometry.R + 3] = poses.centre.repeat(2, axis=0)
+        table[self.n : end, directors] = poses.axes.transpose(0, 2, 1)[:, _TURNED].reshape(-1, 12)
+        table[end:, geometry.R], table[end:, directors] = poses.angle * self.length, _LAB
+        table[self.n :, geometry.METRIC] = table[self.n :, geometry.LENGTH] = 1.0
         return Configuration(table)
 
     def rods(self, configuration: Configuration) -> Configuration:

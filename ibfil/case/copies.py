@@ -53,6 +53,13 @@ def number_of(copy: str) -> int:
     return int(copy.rpartition("_")[2])
 
 
+def copy_names(name: str, copies: Copies | None) -> list[str]:
+    """The names of all copies, as far as their number stands in the case: the name itself where there are none."""
+    if copies is None or copies.count is None:
+        return [name]
+    return [copy_name(name, number) for number in range(copies.count)]
+
+
 def copy_name(name: str, number: int) -> str:
     """The name of copy ``number``, from 0 on, of a filament: NAME_003."""
     return f"{name}_{number:03d}"

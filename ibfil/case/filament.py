@@ -161,7 +161,9 @@ class Filament(Table):
         description="e1 at s = 0, made normal to e3; [0, 1, 0] by default where direction is along z; of points that "
         "are not turned those of the file, or along z, or x, by default",
     )
-    copies: Copies | None = Field(None, description="many of them, called NAME_000, NAME_001 ...")
+    copies: Copies | None = Field(
+        None, description="many of them, called NAME_000, NAME_001 ..., each with the bodies it is in"
+    )
     shape: AnyShape = Field(Straight(), description="shape at t = 0")
     start: End = Field(End(), description="the end at s = 0")
     finish: End = Field(End(), description="the end at s = L")

@@ -53,11 +53,11 @@ def read_case(source: Source, overrides: Overrides = ()) -> Case:
     text of the case, which a run file records, has them. Raises CaseError, one line a fault.
 
     >>> case = ibfil.read_case("swimmer_rft", {"time.end": 0.5})
-    >>> ibfil.read_case(case, {"fluid.viscosity": 2.0}).time.end
+    >>> case.time.end
     0.5
     """
     if isinstance(source, Case):
-        return parse_case(source.text, source.file, overrides) if overrides else source
+        return source.with_(overrides) if overrides else source
     if isinstance(source, Mapping):
         return parse_case(_toml(source), FROM_PYTHON, overrides)
     path = find(str(source))
@@ -92,6 +92,9 @@ def parse_case(text: str, name: str, overrides: Overrides = ()) -> Case:
         told = list(dict.fromkeys(fault.line(name) for fault in faults))
         raise CaseError(told[:MAX_FAULTS] + [f"{name}: more faults follow these"] * (len(told) > MAX_FAULTS))
     return Case.model_construct(**scene.__dict__, text=tomli_w.dumps(raw), file=name, deprecated=tuple(old))
+
+
+Case.reader = parse_case
 
 
 def _toml(content: Mapping[str, Any]) -> str:

@@ -7,19 +7,22 @@ before a case is read, and the text here says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
 from .bodies.body import Body
+from .copies import copy_names
 from .filament import Filament
 from .fluid import Contact, Fluid
 from .link import Link
 from .observe import Expect, Observe, Stop
 from .table import Table
 from .values import Count, Listed, NotNegative, Number, Positive, Real, Seed, Sizes, Vector, Whole
+
+_Overrides = Sequence[str] | Mapping[str, Any]  # of overrides.py
 
 SHORTEST = 1e-12  # of time.end: four digits above the last one of a time
 
@@ -146,12 +149,19 @@ class Scene(Table):
     def joined(self) -> dict[str, tuple[str, ...]]:
         """The names of links, bodies and motors; a motor is called by the end it turns, FILAMENT_start."""
         motors = [
-            f"{name}_{side}"
+            f"{copy}_{side}"
             for name, filament in self.filaments.items()
+            for copy in copy_names(name, filament.copies)
             for side in ("start", "finish")
             if getattr(filament, side).motor is not None
         ]
-        return {"link": tuple(self.links), "body": tuple(self.bodies), "motor": tuple(motors)}
+        return {"link": tuple(self.links), "body": tuple(self.each_body), "motor": tuple(motors)}
+
+    @property
+    def each_body(self) -> dict[str, Body]:
+        """All bodies by name: of those with ends of copies in them one for each, NAME_000, NAME_001 ..."""
+        copies = {end.body: f.copies for f in self.filaments.values() for end in (f.start, f.finish) if end.attached}
+        return {own: body for name, body in self.bodies.items() for own in copy_names(name, copies.get(name))}
 
     @property
     def couples_torque(self) -> bool:
@@ -173,6 +183,8 @@ class Case(Scene):
     text: str
     file: str
     deprecated: tuple[str, ...] = ()
+
+    reader: ClassVar[Callable[[str, str, _Overrides], Case]]  # reading.parse_case, which knows this module
 
     def __repr__(self) -> str:
         names = list(self.filaments)
@@ -196,9 +208,24 @@ class Case(Scene):
         named += [f.copies.file for f in self.filaments.values() if f.copies is not None]
         return [Path(self.file), *(Path(self.file).parent / name for name in named if name)]
 
+    def with_(self, overrides: _Overrides) -> Case:
+        """The case with other values, {"time.end": 2.0, ...}, in its text too, which is what a run records.
+
+        None takes a key out; words "KEY=VALUE" are as on the command line. Raises CaseError, one line a fault.
+
+        >>> case = ibfil.read_case("swimmer_rft")
+        >>> case.with_({"time.end": 0.5, "fluid.viscosity": 2.0}).time.end
+        0.5
+        """
+        return Case.reader(self.text, self.file, overrides)
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy. Raises TypeError with ``update``: it would not be checked, nor be in the text that is recorded."""
         if update:
             keys = ", ".join(f'"{key}": ...' for key in update)
-            raise TypeError(f"a case is changed by overrides: ibfil.read_case(case, {{{keys}}})")
+            raise TypeError(f"a case with other values is case.with_({{{keys}}})")
         return super().model_copy(deep=deep)
+
+    def copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False, **_: Any) -> Self:
+        """The older word for `model_copy`, which it is."""
+        return self.model_copy(update=update, deep=deep)

@@ -20,6 +20,9 @@ class Table(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{name}: a case does not change; one with other values is case.with_({{...}})")
+
 
 def changed(value: Any, change: Callable[[Expression], Expression]) -> Any:
     """A table, list or key with every formula in it changed; the same object where no formula is."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..case.bodies.shapes import Joint
+from ..case.consistency.bodies import ends_in
 
 if TYPE_CHECKING:
     from ..case.bodies.body import Body
@@ -44,12 +45,13 @@ def _of_motor(motor: Motor) -> str:
     return f"torque {motor.stall:g} at rest, none at the rate {motor.free:g}"
 
 
-def of_body(name: str, body: Body) -> str:
+def of_body(case: Case, name: str) -> str:
     """Its shape, how it moves, and what pushes it."""
-    terms = [_shape(body)]
-    given = body.given_motion
+    body, copies = case.bodies[name], sum(own is case.bodies[name] for own in case.each_body.values())
+    terms, given = [_shape(body)], body.given_motion
+    hinges = isinstance(body.shape, Joint) and all(end.hinged for _, _, end in ends_in(case, name))
     if given is None:
-        terms.append("free to move and turn")
+        terms.append("free to move, while its rods turn about it" if hinges else "free to move and turn")
     else:
         still = all(part.constant == 0.0 for part in (*given.moves, *given.turns))
         terms.append("held" if still else "moved as given")
@@ -59,13 +61,15 @@ def of_body(name: str, body: Body) -> str:
         pushed = ["nothing pushes it from outside"]
     outside = "pushes them from outside" if given is None else "pushes them from outside and what holds or moves it"
     total = f"the force and torque of body and rods on the fluid sum to what {outside}, to round-off"
-    return f"body {name}: " + ", ".join([*terms, *pushed]) + f"; {total}"
+    return f"body {name}{f', {copies} copies' if copies > 1 else ''}: " + ", ".join([*terms, *pushed]) + f"; {total}"
 
 
 def _shape(body: Body) -> str:
     """Its size."""
     if isinstance(body.shape, Joint):
         return "a joint without size or drag"
+    if body.shape.file is not None:
+        return f"the markers of {body.shape.file}"
     first, *others = body.shape.semi_axes
     if others == [first, first]:
         return f"a sphere of radius {first:g}"

@@ -38,7 +38,7 @@ def of_filament(simulation: Simulation, filament: Filament) -> dict[str, float]:
         out["wavelength/ds"] = float(wave / ds)
     if filament.mass is not None:
         drag = simulation.drag(filament)
-        time = 1 / rate if rate else simulation.bending_time()
+        time = 1 / rate if rate else timescales.slowest_bending(simulation.model)
         out["m/(zeta T), inertia of the rod"] = timescales.mean_mass(filament) / (drag * time)
     return out | simulation.model.fluid_model.groups(filament, rate)
 

@@ -14,6 +14,7 @@ from ..case.expressions import COPIED
 from ..case.idle import idle_keys
 from ..case.table import expressions
 from ..observables.factory import observers
+from ..simulation import timescales
 from ..simulation.schedule import due_times
 from ..simulation.simulation import Simulation
 from ..simulation.steps import AUTOMATIC_ERROR, POINTS_A_PERIOD
@@ -53,7 +54,6 @@ def _section(title: str, lines: list[str]) -> list[str]:
 
 
 LARGE = 50_000  # nodes, beyond which some hundred velocities are no matter of seconds
-MANY = 2000  # filaments, each of which has datasets of its own
 
 _MOTIONS = {"moves": "prescribed motion", "spin": "spin", "angle": "prescribed turn"}
 
@@ -95,7 +95,7 @@ def modelled(case: Case) -> list[str]:
             terms.append("standing where its points are given (0.1.0 moved and turned them to position and direction)")
         out.append(f"filament {name}, {f.nodes} nodes{_copies(f)}: " + ", ".join(terms))
     out += [f"link {name}: {link.words}" for name, link in case.links.items()]
-    out += [of_body(name, body) for name, body in case.bodies.items()]
+    out += [of_body(case, name) for name in case.bodies]
     if case.fluid.flow is not None:
         spins = ", and spins those that twist by half its vorticity about the tangent" if case.twists else ""
         out.append(f"a background flow, which moves the nodes{spins}")
@@ -174,19 +174,18 @@ def _costs(simulation: Simulation) -> list[str]:
     case, fluid = simulation.case, simulation.model.fluid_model
     unknowns = simulation.system.unknowns
     lines = [f"{simulation.rods.count} nodes with {unknowns} unknowns each; method {simulation.method}"]
+    lines += fluid.solved(simulation.rods)
     lines += fluid.size()
     used = memory(simulation)
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
     lines += fluid.remarks()
-    written = len(simulation.rods.written(case.output.copies_every))
-    some = "" if written == len(simulation.rods.names) else f", of {written} of {len(simulation.rods.names)} filaments"
+    written, whole = len(simulation.rods.written(case.output.copies_every)), len(simulation.rods.names)
+    some = "" if written == whole else f", of {written} of {whole} filaments"
     lines.append(f"disk at most {_bytes(disk(simulation))}{some}, fields compressed")
-    if written > MANY:
-        lines.append(f"outputs of {written} filaments take long: output.copies_every writes every so many-th copy")
     methods = simulation.model.seconds
     if len(methods) > 1:
-        others = ", ".join(f"{k} {v:.2g}" for k, v in methods.items() if np.isfinite(v))
+        others = ", ".join(f"{k} {v:.2g}" if np.isfinite(v) else f"{k} too large" for k, v in methods.items())
         lines.append(f"seconds a step, from counts: {others}")
     seconds = methods[simulation.method]
     fewest, steps = foretold_steps(simulation)
@@ -229,7 +228,10 @@ def _steps(simulation: Simulation) -> list[str]:
     if simulation.rods.count > LARGE:
         limit = f"its limit is not looked for beyond {LARGE} nodes"
     elif not case.heavy and not case.bodies:
-        limit = f"stable below dt = {simulation.explicit_limit():.3g} at the start shape, 2/rho(M K)"
+        most = simulation.explicit_limit()
+        limit = f"stable below dt = {most:.3g} at the start shape, 2/rho(M K)"
+        if not np.isfinite(most):
+            limit = "no limit found: at the start shape no force answers to a move, or a force or the flow has no value"
     return [
         *lines,
         f"explicit scheme: {limit}",
@@ -237,7 +239,7 @@ def _steps(simulation: Simulation) -> list[str]:
         *UNWATCHED[: bool(case.bodies)],
         *simulation.model.fluid_model.step_lines(),
         *_driven(simulation),
-        f"slowest bending time: {simulation.bending_time():.4g}",
+        f"slowest bending time: {timescales.slowest_bending(simulation.model):.4g}",
         *ringing(simulation),
     ]
 

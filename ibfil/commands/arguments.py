@@ -39,6 +39,13 @@ def count(text: str) -> int:
     return int(text)
 
 
+def port(text: str) -> int:
+    """A port that needs no rights, or 0."""
+    if not text.isascii() or not text.isdigit() or not (int(text) == 0 or 1024 <= int(text) <= 65535):
+        raise argparse.ArgumentTypeError(f"found {text}; allowed: 1024 to 65535, or 0 for one that is free")
+    return int(text)
+
+
 def positive(text: str) -> float:
     """A number above zero."""
     value = _number(text)
@@ -120,4 +127,4 @@ def say_if_cold() -> None:
     cache = Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache_path("numba", appauthor=False))
     elsewhere = cache / f"{package.name}_{hashlib.sha1(str(package).encode()).hexdigest()}"
     if not any((package / "__pycache__").glob("*.nbi")) and not any(elsewhere.glob("*.nbi")):
-        warn("compiling the numerical kernels, once: half a minute or so")
+        warn("compiling the numerical kernels, once: ten seconds to half a minute")

@@ -13,7 +13,8 @@ NAME, HELP = "bench", "time the pieces of a step against floors measured in the 
 def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     words = (
-        "pieces, swimmer (the usual two), start, spaces, thermal, links, body, large, threads, many, members, million"
+        "pieces, swimmer (the usual two), start, spaces, thermal, links, body, studies, large, threads, many, "
+        "members, million, mpi"
     )
     command.add_argument("parts", nargs="*", metavar="PART", help=words)
     command.add_argument("--json", action="store_true", help="as JSON")

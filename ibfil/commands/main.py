@@ -17,12 +17,12 @@ from pathlib import Path
 from ..errors import CaseError, Interrupted, RunFailed
 from ..screen import let_go, lost, prepare, warn
 from ..version import __version__
-from . import bench, cases, check, new, page, render, run, schema, show, verify, vtk, warm
+from . import bench, cases, check, live, new, page, render, run, schema, show, verify, vtk, warm
 from .arguments import BAD_INPUT, CUT, FAILED
 from .studies import compare, fit, modes, rest, stability, sweep, trade, tune, uncertainty
 
 COMMANDS = (
-    *(run, check, new, cases, schema, show, vtk, render, page),
+    *(run, check, new, cases, schema, show, vtk, render, page, live),
     *(sweep, uncertainty, tune, trade, compare, stability, rest, modes, fit, verify, bench, warm),
 )
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}

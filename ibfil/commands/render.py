@@ -24,7 +24,7 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("--zoom", type=float, default=1.0, metavar="N", help="nearer, above 1")
     command.add_argument("--box", action="store_true", help="draw the periodic box")
     command.add_argument(
-        "--wrap", action="store_true", help="bring filaments, but no links or bodies, into the box, cut at its faces"
+        "--wrap", action="store_true", help="bring all into the box: filaments cut at its faces, links and bodies whole"
     )
     command.add_argument("--follow", metavar="NAME", help="keep this filament in the middle")
     command.add_argument("--flow", default="none", metavar="HOW", help="none, slice, glyphs or streamlines")

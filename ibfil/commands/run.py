@@ -9,6 +9,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError
+from ..parallel.launch import processes
 from ..screen import tell
 from ..threads import set_threads
 from .arguments import DONE, add_case, only_changes, read_case, say_if_cold
@@ -29,7 +30,21 @@ def add(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> int:
-    """Do it; returns the exit status."""
+    """Do it; returns the exit status. Under mpiexec process 0 does, and the others share its grid."""
+    if processes() == 1:
+        return _do(arguments)
+    set_threads(1)  # of numpy's libraries in all processes but 0, which reads its case first
+    from ..parallel.ranks import Ranks, join, serve
+
+    comm = join()
+    if comm.rank:
+        serve(comm)
+        return DONE
+    with Ranks(comm) as ranks, ranks.sharing():
+        return _do(arguments)
+
+
+def _do(arguments: argparse.Namespace) -> int:
     words = arguments.words
     if arguments.resume:
         return _resume(arguments)

@@ -15,6 +15,11 @@ def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     command.add_argument("cases", nargs="*", metavar="CASE")
     command.add_argument("--quick", action="store_true", help="the quick form of each case")
+    command.add_argument(
+        "--bars",
+        action="store_true",
+        help="an error bar on every number found, as ibfil uncertainty has it: some eight times the runs",
+    )
 
 
 def do(arguments: argparse.Namespace) -> int:
@@ -23,4 +28,4 @@ def do(arguments: argparse.Namespace) -> int:
     say_if_cold()
     from ..studies.verify import verify
 
-    return verify(arguments.cases, arguments.quick, tell)
+    return verify(arguments.cases, arguments.quick, tell, bars=arguments.bars)

@@ -18,7 +18,7 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("run", metavar="RUN.h5")
     command.add_argument("-o", dest="folder", metavar="DIR", help="the folder (default: the run's name)")
     command.add_argument(
-        "--wrap", action="store_true", help="bring filaments, but no links or bodies, into the box, cut at its faces"
+        "--wrap", action="store_true", help="bring all into the box: filaments cut at its faces, links and bodies whole"
     )
     command.add_argument("--images", type=digit, default=0, metavar="N", help="periodic images in N boxes on each side")
     command.add_argument("--every", type=count, default=1, metavar="N", help="every N-th output only; all fields")

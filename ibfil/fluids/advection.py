@@ -10,9 +10,9 @@ grid makes flow up to k_max: the swimmer at rho = 100, 64^3, 100 steps a period 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ..grid.periodic_grid import Grid
+from ..linalg.compiled import njit
 
 STRENGTH, POWER = 36.0, 36.0
 

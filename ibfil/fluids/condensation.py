@@ -16,12 +16,10 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import solve_banded
-from scipy.sparse import coo_array, csc_array, dia_array
-from scipy.sparse.linalg import splu
 
 from ..linalg import banded
 from ..linalg.constraints import Prescribed
+from ..linalg.lapack import solve_banded
 from ..linalg.normal_numbers import Draw, Purpose
 from ..linalg.stiffness import Pairs, Stiffness, no_pairs, nodes_of
 
@@ -62,7 +60,10 @@ class Turns(NamedTuple):
         diagonals[2, :-1] = -band[1:, 3, middle - m + 3] * self.still[1:]
         rows, columns, blocks = stiffness.pairs
         if not blocks[:, 3, 3].any():
-            return lambda right: solve_banded((1, 1), diagonals, right, check_finite=False)
+            return lambda right: solve_banded(1, diagonals, right)
+        from scipy.sparse import coo_array, csc_array, dia_array
+        from scipy.sparse.linalg import splu
+
         n = len(band)
         tridiagonal = dia_array((diagonals, [1, 0, -1]), shape=(n, n))
         corners = coo_array((-blocks[:, 3, 3] * self.still[rows], (rows, columns)), shape=(n, n))

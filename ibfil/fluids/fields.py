@@ -37,8 +37,9 @@ class GridFields:
 
         The nodes have the stencils (base, weights); torques act as half a curl (torque_coupling.py).
         """
-        # Each field is transformed in the same room, so what they are made of is kept elsewhere.
         modes = self._modes(base, weights, force[:, :3])
+        if force.shape[1] == 6 or len(names) > 1:
+            modes = modes.copy()  # what fields are made of is kept elsewhere: each is transformed in the same room
         if force.shape[1] == 6:
             half_curl(self._modes(base, weights, force[:, 3:]), *self._axes, modes)
         out = {}
@@ -61,6 +62,7 @@ class GridFields:
         """
         modes = self._modes(base, weights, force[:, :3])
         if force.shape[1] == 6:
+            modes = modes.copy()
             half_curl(self._modes(base, weights, force[:, 3:]), *self._axes, modes)
         u, t = self._velocity(modes), self._transform
         sx, sy, sz = self._squares
@@ -73,7 +75,8 @@ class GridFields:
         turns = np.zeros_like(u)
         if force.shape[1] == 6:
             half_curl(u, *self._axes, turns)
-        t.modes[:] = u
+        if u is not t.modes:
+            t.modes[:] = u
         power = float(np.sum(interpolate(base, weights, t.backward()) * force[:, :3]))
         if force.shape[1] == 6:
             t.modes[:] = turns
@@ -87,14 +90,17 @@ class GridFields:
         return force
 
     def _modes(self, base: np.ndarray, weights: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """The modes of the spread forces (n, 3), as a density."""
+        """The modes of the spread forces (n, 3), as a density, in the room of the transform."""
         t = self._transform
         t.real[:] = 0.0
         spread(base, weights, force, t.real)
-        return t.forward() / (t.size * self.grid.spacing**3)
+        modes = t.forward()
+        modes *= 1.0 / (t.size * self.grid.spacing**3)
+        return modes
 
     def _real(self, modes: np.ndarray, background: np.ndarray | None) -> np.ndarray:
-        self._transform.modes[:] = modes
+        if modes is not self._transform.modes:
+            self._transform.modes[:] = modes
         real = np.moveaxis(self._transform.backward(), 0, -1)
         return (real if background is None else real + background).astype(np.float32)
 

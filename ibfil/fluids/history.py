@@ -16,13 +16,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..grid.fft import modes_of
 from ..grid.fftw import pyfftw
 from ..grid.periodic_grid import Grid
 from ..grid.slab_fft import Block
 from ..grid.spectral import solenoidal
+from ..linalg.compiled import njit
 from .advection import filters
 
 
@@ -61,16 +61,20 @@ class History:
     """Velocities and advection (3, nx, ny, nz//2 + 1) at the last two steps.
 
     Kept in the type ``number``, double or single precision, and computed in double. Loops go over pairs of reals, which
-    compilers vectorise, as all multipliers are real.
+    compilers vectorise, as all multipliers are real. ``rows`` are those modes along the second axis that are kept here,
+    all of them but where processes share a grid (parallel/).
     """
 
-    def __init__(self, grid: Grid, density: float, viscosity: float, number: type = np.float64) -> None:
+    def __init__(
+        self, grid: Grid, density: float, viscosity: float, number: type = np.float64, rows: slice = slice(None)
+    ) -> None:
         nx, ny, nz = (int(n) for n in grid.cells)
-        fields = _fields(5, (3, nx, ny, nz // 2 + 1), modes_of(number))
-        self.now, self.old, self.n_now, self.n_old = fields[:4]
-        self._ahead = fields[4]  # what the step asked about last would come to without forces
         (kx, ky, kz), (sx, sy, sz) = grid.wave_numbers()
         fx, fy, fz = filters(grid)
+        ky, sy, fy = ky[rows], sy[rows], fy[rows]
+        fields = _fields(5, (3, nx, len(ky), nz // 2 + 1), modes_of(number))
+        self.now, self.old, self.n_now, self.n_old = fields[:4]
+        self._ahead = fields[4]  # what the step asked about last would come to without forces
         self._waves = (kx, ky, np.repeat(kz, 2), viscosity * sx, viscosity * sy, viscosity * np.repeat(sz, 2))
         self._filters = (fx, fy, np.repeat(fz, 2))
         self._scale, self._force_scale = density / (nx * ny * nz), 1.0 / (nx * ny * nz * grid.spacing**3)
@@ -131,7 +135,7 @@ def _predict(out, ahead, now, old, n_now, n_old, i0, j0, kx, ky, kz, sx, sy, sz,
                 ahead[0, i, j, k] = out[0, i - i0, j - j0, k] = u
                 ahead[1, i, j, k] = out[1, i - i0, j - j0, k] = v
                 ahead[2, i, j, k] = out[2, i - i0, j - j0, k] = w
-    if i0 == 0 and j0 == 0:
+    if i0 == 0 and j0 == 0 and sx[0] + sy[0] + sz[0] == 0.0:  # the mean mode is among these
         for x in range(3):
             for k in range(2):
                 ahead[x, 0, 0, k] = out[x, 0, 0, k] = 0.0
@@ -161,7 +165,7 @@ def _apply_forces(force, ahead, flow, i0, j0, kx, ky, kz, sx, sy, sz, fx, fy, fz
                 flow[3, i, j, k], flow[3, i, j, k + 1] = r * v - q * g, q * w - r * u
                 flow[4, i, j, k], flow[4, i, j, k + 1] = p * g - r * b, r * a - p * w
                 flow[5, i, j, k], flow[5, i, j, k + 1] = q * b - p * v, p * u - q * a
-    if i0 == 0 and j0 == 0:
+    if i0 == 0 and j0 == 0 and sx[0] + sy[0] + sz[0] == 0.0:  # the mean mode is among these
         for x in range(3):
             for k in range(2):
                 ahead[x, 0, 0, k] = flow[x, 0, 0, k] = 0.0

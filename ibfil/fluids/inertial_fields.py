@@ -16,13 +16,13 @@ from .base import Flow
 from .fields import GridFields
 
 if TYPE_CHECKING:
-    from .navier_stokes import NavierStokes
+    from .navier_stokes import InertialFluid
 
 
 class InertialFields(GridFields):
     """The fields of ``fluid`` as it is, with the forces that act now."""
 
-    def __init__(self, fluid: NavierStokes, flow: Flow | None, threads: int = 1) -> None:
+    def __init__(self, fluid: InertialFluid, flow: Flow | None, threads: int = 1) -> None:
         super().__init__(fluid.grid, fluid.immersed.viscosity, flow, threads)
         self._fluid = fluid
 

@@ -14,17 +14,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy.fft import irfftn
 
 from ..grid.far_pairs import far_pair, is_far, moments
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol
+from ..linalg.compiled import njit
 from ..linalg.vectors import NOT_NEGATIVE
 
 ALL = 2**62  # a reach that no pair is beyond
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SIX = (0,) * 6
+IN_ANY_ORDER = {"contract", "reassoc", "nsz"}  # sums may be taken so: what numba calls fastmath
 
 
 def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarray:
@@ -32,6 +32,8 @@ def point_response(grid: Grid, viscosity: float, alpha: float = 0.0) -> np.ndarr
 
     Unit force: density 1/h^3 on that cell. ``alpha`` (density over time) is zero in Stokes flow.
     """
+    from scipy.fft import irfftn
+
     symbol = StokesSymbol(*grid.wave_numbers(), viscosity, alpha)
     total, out = symbol.total * grid.spacing**3, np.empty((6, *grid.cells))
     for c, (a, b) in enumerate(COMPONENTS):
@@ -92,13 +94,14 @@ def plane_sums(table, corner, c, acc, unit, points):
                 acc[k] += c[1, j] * line
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+@njit(cache=True, inline="always")
 def sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points):
     """All components of the octant for the pair a, b into ``sums`` (k,), the first six of them M_ab: xx .. yz.
 
     ``c`` (3, 2 P - 1) and ``acc`` (k (2 P - 1),) are room to work in, ``unit`` and ``points`` tuples of k and of P
     entries: what the compiler knows of k and P. Returns the signs (3,) of the mirrored axes, for components beyond the
-    sixth. Arrays are indexed in full in every loop: a view of one costs more than the arithmetic.
+    sixth. Arrays are indexed in full in every loop, and the whole is in line: a view of one costs more than the
+    arithmetic, and a call, which counts references to all of them, a seventh of it.
     """
     p, parts = len(points), len(unit)
     corner = (0, 0, 0)
@@ -135,16 +138,20 @@ def sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points):
 
 @njit(cache=True, inline="always")
 def sum_any(octant, base, weights, centres, a, b, c, acc, sums, unit, points):
-    """The same of pairs near and far; ``centres`` are the moments of the nodes' weights (grid/far_pairs.py)."""
-    if is_far(base, a, b, octant.reach):
-        far_pair(centres[0], centres[1], a, b, octant.scales, sums)
-        return 1.0, 1.0, 1.0
+    """The same of pairs near and far; ``centres`` are the moments of the nodes' weights (grid/far_pairs.py).
+
+    They are None where no pair is far, and what is for these is not compiled.
+    """
+    if centres is not None:  # noqa: SIM102  what is asked of None alone the compiler leaves out
+        if is_far(base, a, b, octant.reach):
+            far_pair(centres[0], centres[1], a, b, octant.scales, sums)
+            return 1.0, 1.0, 1.0
     return sum_pair(octant, base, weights, a, b, c, acc, sums, unit, points)
 
 
-@njit(cache=True)
-def _pairs(octant, base, weights, slip, rows, columns, points):
-    terms, centres = 2 * len(points) - 1, moments(base, weights)
+@njit(cache=True, fastmath=IN_ANY_ORDER)
+def _pairs(octant, base, weights, centres, slip, rows, columns, points):
+    terms = 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((rows.size, 3, columns.size, 3))
     for i in range(rows.size):
@@ -159,9 +166,9 @@ def _pairs(octant, base, weights, slip, rows, columns, points):
     return out
 
 
-@njit(cache=True)
-def _mobility(octant, base, weights, slip, points):
-    n, terms, centres = weights.shape[0], 2 * len(points) - 1, moments(base, weights)
+@njit(cache=True, fastmath=IN_ANY_ORDER)
+def _mobility(octant, base, weights, centres, slip, points):
+    n, terms = weights.shape[0], 2 * len(points) - 1
     c, acc, sums = np.empty((3, terms)), np.empty(6 * terms), np.empty(6)
     out = np.empty((n, 3, n, 3))
     for a in range(n):
@@ -177,6 +184,11 @@ def _mobility(octant, base, weights, slip, points):
     return out
 
 
+def _centres(octant: Octant, base: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """The moments of the nodes' weights, where pairs may be far; None where the fluid is periodic."""
+    return None if octant.reach == ALL else moments(base, weights)
+
+
 def pairs(
     octant: Octant, base: np.ndarray, weights: np.ndarray, slip: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> np.ndarray:
@@ -184,9 +196,11 @@ def pairs(
 
     ``base`` (n, 3) and ``weights`` (n, 3, P) are the nodes' stencils.
     """
-    return _pairs(octant, base, weights, slip, rows, columns, (0,) * weights.shape[2])
+    centres = _centres(octant, base, weights)
+    return _pairs(octant, base, weights, centres, slip, rows, columns, (0,) * weights.shape[2])
 
 
 def mobility(octant: Octant, base: np.ndarray, weights: np.ndarray, slip: np.ndarray) -> np.ndarray:
     """The whole matrix (n, 3, n, 3) of the nodes, symmetric to the last bit, with the slip on its diagonal."""
-    return _mobility(octant, base, weights, slip, (0,) * weights.shape[2])
+    centres = _centres(octant, base, weights)
+    return _mobility(octant, base, weights, centres, slip, (0,) * weights.shape[2])

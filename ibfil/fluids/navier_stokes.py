@@ -11,9 +11,10 @@ N(U + u') - N(U).
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.slab_fft import Block, SlabFFT
 from ..grid.spectral import half_curl
-from ..grid.spreading import interpolate
+from ..grid.spreading import Stencil, interpolate
 from .advection import cross, cross_in
 from .background_flow import FIELDS, Background
 from .base import Response
@@ -81,28 +82,59 @@ class Asked(NamedTuple):
     weights: Weights
 
 
-class NavierStokes:
-    """An immersed-boundary fluid of density rho.
+class Past(Protocol):
+    """The past of a fluid with inertia (history.py)."""
 
-    ``operator`` makes the Stokes fluid (stokes.py) with an alpha in its symbol.
+    dt_old: float
+
+    @property
+    def now(self) -> np.ndarray:
+        """The modes (3, nx, ny, nz//2 + 1) of the present velocity."""
+
+    def memory(self) -> dict[str, np.ndarray | float]:
+        """All of it; nothing before the first step."""
+
+    def recall(self, memory: dict[str, np.ndarray | float]) -> None:
+        """Takes up what ``memory`` gave."""
+
+
+class InertialFluid(ABC):
+    """An immersed-boundary fluid of density rho on a grid: its steps, wherever the fields are.
+
+    ``operator`` makes the Stokes fluid (stokes.py) with an alpha in its symbol, ``fastest`` is how fast it is at first.
     """
+
+    history: Past
 
     def __init__(
         self,
         immersed: Immersed,
         density: float,
         operator: Callable[[float], Tabulated],
-        workspace: Workspace,
-        background: Background | None = None,
+        grid: Grid,
+        fastest: float,
     ) -> None:
-        self.immersed, self.density = immersed, density
-        self.grid = workspace.grid
-        self.history = History(self.grid, density, immersed.viscosity, immersed.number)
-        self._make, self.workspace, self._background = operator, workspace, background
+        self.immersed, self.density, self.grid, self.fastest = immersed, density, grid, fastest
+        self._make = operator
         self._operators: list[tuple[float, Tabulated]] = []  # alpha and what has it, the last used first
         self._asked: Asked | None = None
         self.time = 0.0
-        self.fastest = 0.0 if background is None else float(np.abs(background.at(0.0)[:3]).max())
+
+    @abstractmethod
+    def _coast(self, nodes: Nodes, past: Weights) -> np.ndarray:
+        """The velocity (n, 3), or with half its vorticity (n, 6), that nodes would feel after a step without forces."""
+
+    @abstractmethod
+    def _push(self, nodes: Nodes, past: Weights, vectors: np.ndarray) -> None:
+        """The step asked about last is taken, with what nodes put onto the grid (n, 3 v); sets ``fastest``."""
+
+    @abstractmethod
+    def _felt(self, places: Stencil) -> np.ndarray:
+        """The present velocity (k, 3) as nodes at ``places`` would feel it."""
+
+    @abstractmethod
+    def background(self) -> np.ndarray:
+        """Velocity and vorticity (6, nx, ny, nz) of the maintained flow now, which there must be; filtered."""
 
     def _operator(self, alpha: float) -> tuple[float, Tabulated]:
         """The operator of alpha, or of one that is the same but for round-off."""
@@ -116,7 +148,7 @@ class NavierStokes:
         """The mobility over a step of effective length tau, and the velocity with which the fluid coasts into it."""
         alpha, operator = self._operator(self.density / tau)
         nodes, past = self.immersed.nodes(r, e3), weights(alpha, tau, w, self.history.dt_old)
-        felt = self.workspace.gather(nodes, partial(self.history.predict, past))
+        felt = self._coast(nodes, past)
         u0, flow = self.immersed.coupling.from_grid(nodes.axes, felt), self.immersed.advected(nodes, r, time)
         if flow is not None:
             u0 = np.column_stack([u0 + flow[:, : u0.shape[1]], flow[:, u0.shape[1] :]])
@@ -129,25 +161,8 @@ class NavierStokes:
         if self._asked is None or response is not self._asked.response:
             raise ValueError("a step that is taken must be the one the fluid was asked for last")
         nodes, past = self._asked.nodes, self._asked.weights
-        for block in self.workspace.scatter(nodes, self.immersed.coupling.to_grid(nodes.axes, force)):
-            self.history.apply_forces(past, block, self.workspace.flow.modes)
         self.time += past.dt
-        self._advect(self.history.commit(past))
-
-    def _advect(self, out: np.ndarray) -> None:
-        """Into ``out``, the modes of omega x u, of the velocity and vorticity whose modes the transform holds."""
-        t = self.workspace.flow
-        t.backward(FIELDS)
-        if self._background is None:
-            self.fastest = cross(t.real, 0.0)
-        else:
-            self.fastest = cross_in(t.real, self.background(), 0.0)
-        t.forward(into=out)
-
-    def background(self) -> np.ndarray:
-        """Velocity and vorticity (6, nx, ny, nz) of the maintained flow now, which there must be; filtered."""
-        assert self._background is not None
-        return self._background.at(self.time)
+        self._push(nodes, past, self.immersed.coupling.to_grid(nodes.axes, force))
 
     def longest_step(self) -> float:
         """That in which the fastest fluid crosses COURANT cells."""
@@ -157,10 +172,8 @@ class NavierStokes:
         self, points: np.ndarray, r: np.ndarray, e3: np.ndarray, force: np.ndarray, time: float
     ) -> np.ndarray:
         """The velocity (k, 3) at ``points`` (k, 3), as a node there would feel it; it is the fluid's present one."""
-        immersed = self.immersed
-        self.workspace.flow.modes[:3] = self.history.now
-        u = interpolate(*immersed.stencil(points), self.workspace.flow.backward())
-        return u if immersed.flow is None else u + immersed.flow(points, time)
+        u = self._felt(self.immersed.stencil(points))
+        return u if self.immersed.flow is None else u + self.immersed.flow(points, time)
 
     def memory(self) -> dict[str, np.ndarray | float]:
         """The past, and what the kept operators were made from."""
@@ -186,3 +199,49 @@ class NavierStokes:
             known = part(f"operator{k}_")
             if known:
                 operator.recall(known)
+
+
+class NavierStokes(InertialFluid):
+    """The fluid whose fields are all in the memory of this process."""
+
+    history: History
+
+    def __init__(
+        self,
+        immersed: Immersed,
+        density: float,
+        operator: Callable[[float], Tabulated],
+        workspace: Workspace,
+        background: Background | None = None,
+    ) -> None:
+        fastest = 0.0 if background is None else float(np.abs(background.at(0.0)[:3]).max())
+        super().__init__(immersed, density, operator, workspace.grid, fastest)
+        self.history = History(self.grid, density, immersed.viscosity, immersed.number)
+        self.workspace, self._background = workspace, background
+
+    def _coast(self, nodes: Nodes, past: Weights) -> np.ndarray:
+        return self.workspace.gather(nodes, partial(self.history.predict, past))
+
+    def _push(self, nodes: Nodes, past: Weights, vectors: np.ndarray) -> None:
+        for block in self.workspace.scatter(nodes, vectors):
+            self.history.apply_forces(past, block, self.workspace.flow.modes)
+        self._advect(self.history.commit(past))
+
+    def _advect(self, out: np.ndarray) -> None:
+        """Into ``out``, the modes of omega x u, of the velocity and vorticity whose modes the transform holds."""
+        t = self.workspace.flow
+        t.backward(FIELDS)
+        if self._background is None:
+            self.fastest = cross(t.real, 0.0)
+        else:
+            self.fastest = cross_in(t.real, self.background(), 0.0)
+        t.forward(into=out)
+
+    def background(self) -> np.ndarray:
+        """Velocity and vorticity (6, nx, ny, nz) of the maintained flow now, which there must be; filtered."""
+        assert self._background is not None
+        return self._background.at(self.time)
+
+    def _felt(self, places: Stencil) -> np.ndarray:
+        self.workspace.flow.modes[:3] = self.history.now
+        return interpolate(*places, self.workspace.flow.backward())

@@ -23,7 +23,7 @@ from .coupling import Nodes
 _EXACT = 1e-8  # relative error of GMRES where its preconditioner is the operator itself
 _LOOSE = 1e-6  # and where it is not: less than Newton gains in an iteration by the time it stops
 _WITH_TORQUES = 0.01  # of that with torques: those that hold a turn, and turns in radians, outweigh moves by so much
-_MOST = 5 * 60  # products of a solve, before it is given up
+MOST = 5 * 60  # products of a solve, before it is given up
 _DRIFT = 0.4  # of tau, by which a kept preconditioner may be off: less than the change from Euler to BDF2
 _TRIAL = 8  # of so many preconditioners one is kept for longer, to find how long they serve
 
@@ -163,7 +163,7 @@ class WholeMatrix:
                 rods.stiffness,
                 gmres.factored(lambda: [(every, system)], [len(every)], rods.held, self._matrix.units),
             )
-        return _checked(gmres.solve(asked.product, right, self._known[1], _EXACT, _MOST))
+        return _checked(gmres.solve(asked.product, right, self._known[1], _EXACT, MOST))
 
 
 class _Source(NamedTuple):
@@ -201,7 +201,7 @@ class RodByRod:
                 self._make(_Source(asked.nodes, asked.tau, asked.statement.frozen()))
             assert kept.blocks is not None
             tolerance = self._share * max(_LOOSE, asked.error)
-            found = gmres.solve(asked.product, right, kept.blocks, tolerance, _MOST if fresh else kept.patience)
+            found = gmres.solve(asked.product, right, kept.blocks, tolerance, MOST if fresh else kept.patience)
             kept.took(found)
             if found.found or fresh:
                 return _checked(found)

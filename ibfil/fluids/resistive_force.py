@@ -13,9 +13,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..linalg import banded
+from ..linalg.compiled import njit
 from ..linalg.constraints import Prescribed
 from ..linalg.normal_numbers import Draw, Purpose
 from ..linalg.stiffness import Rows, Stiffness

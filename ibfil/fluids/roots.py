@@ -15,13 +15,13 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import lapack
 
 from ..errors import StepFailed
 from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import half_curl, project_root
 from ..grid.spreading import interpolate
+from ..linalg.lapack import dpotrf
 from ..linalg.normal_numbers import Draw, Purpose
 from .coupling import Coupling, Nodes
 
@@ -45,7 +45,7 @@ class DenseRoot:
 
     @cached_property
     def _factor(self) -> np.ndarray:
-        factor, bad = lapack.dpotrf(self._matrix, lower=True, clean=True)
+        factor, bad = dpotrf(self._matrix, lower=True, clean=True)
         if bad:
             raise NoRoot("the mobility of the nodes is not positive, so that thermal motion has no root of it", 0)
         return factor

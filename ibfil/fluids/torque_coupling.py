@@ -33,7 +33,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from scipy.fft import irfftn
 
 from ..grid.far_pairs import moments
@@ -41,7 +40,8 @@ from ..grid.fft import VectorTransform
 from ..grid.periodic_grid import Grid
 from ..grid.spectral import StokesSymbol, half_curl, project
 from ..grid.spreading import interpolate, spread
-from .mobility_table import COMPONENTS, Octant, point_response, sum_any
+from ..linalg.compiled import njit
+from .mobility_table import COMPONENTS, IN_ANY_ORDER, Octant, point_response, sum_any
 from .velocity_gradient import advected
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def _between(sums, sign, d, e):
     return out + sign[1] * sign[2] * sums[14] * (d[1] * e[2] + d[2] * e[1])
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=IN_ANY_ORDER)
 def _pairs(octant, base, weights, axes, own, rows, columns, points):
     terms, centres = 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)
@@ -103,7 +103,7 @@ def _pairs(octant, base, weights, axes, own, rows, columns, points):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=IN_ANY_ORDER)
 def _mobility(octant, base, weights, axes, own, points):
     n, terms, centres = weights.shape[0], 2 * len(points) - 1, moments(base, weights)
     c, acc, sums = np.empty((3, terms)), np.empty(15 * terms), np.empty(15)

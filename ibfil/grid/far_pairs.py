@@ -14,7 +14,8 @@ whose even and odd sums agree have no more to say at distances of the table's re
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..linalg.compiled import njit
 
 
 @njit(cache=True)

@@ -1,4 +1,4 @@
-"""pyfftw, without the interface to Dask that it would load.
+"""pyfftw, without the interfaces to Dask and to scipy that it would load.
 
 Where Dask is installed `import pyfftw` loads all of its arrays, and pandas and xarray with them: a second, of which no
 run has any use. Where Dask is loaded already, as in its workers, there is nothing to spare.
@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import sys
 
-_spared = "dask" not in sys.modules
-if _spared:
-    sys.modules["dask"] = None  # type: ignore[assignment]
+_spared = [name for name in ("dask", "scipy.fft", "scipy.fftpack") if name not in sys.modules]
+for _name in _spared:
+    sys.modules[_name] = None  # type: ignore[assignment]
 try:
     import pyfftw
 finally:
-    if _spared:
-        del sys.modules["dask"]
+    for _name in _spared:
+        del sys.modules[_name]
 
 __all__ = ["pyfftw"]

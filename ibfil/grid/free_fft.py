@@ -10,9 +10,9 @@ with the response laid out evenly (a part that is odd: oddly), is the one of fre
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.fft import dct, dst
 
+from ..linalg.compiled import njit
 from .free_space import ODD, PARTS, response
 from .padded_fft import PaddedTransform
 from .spreading import interpolate, spread

@@ -16,8 +16,8 @@ and in a thick one FFTs of blocks of lines, padded and cut while they are in cac
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from .fft import ESTIMATED, plan, useful_threads
 from .fftw import pyfftw
 from .periodic_grid import Grid

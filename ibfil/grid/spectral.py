@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
+
+from ..linalg.compiled import njit
 
 
 class StokesSymbol:

@@ -14,9 +14,9 @@ Heights stand in the weights of the nodes, so f' and z Q need no field of their 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.fft import dct, fft
 
+from ..linalg.compiled import njit
 from .free_fft import FreeSolve, padded, sines, symbols
 from .padded_fft import PaddedTransform
 from .spreading import Stencil, interpolate, mirrored, spread

@@ -16,8 +16,8 @@ the plane as far as G is Oseen's tensor; a stencil is folded there (fluids/space
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from .free_space import REACH, RIM
 
 # The parts are T0 xx yy zz xy, T1 x y, T2 xx yy xy, t x y; and these are the axes along which each is odd.

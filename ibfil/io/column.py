@@ -7,6 +7,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+CLOSED = "the run file is closed; ibfil.open opens it again"
+
 
 class Column:
     """A dataset (T, ...) of which the first ``rows`` count; indexing reads, ``np.asarray`` reads it all."""
@@ -36,8 +38,15 @@ class Column:
             first = number % len(self)
         else:
             return np.asarray(self)[key]
-        return self._dataset[(first, *rest)]
+        return self._open[(first, *rest)]
+
+    @property
+    def _open(self) -> h5py.Dataset:
+        """The dataset. Raises ValueError where its file has been closed."""
+        if not self._dataset:
+            raise ValueError(CLOSED)
+        return self._dataset
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        values = self._dataset[: len(self)]
+        values = self._open[: len(self)]
         return values if dtype is None else values.astype(dtype)

@@ -29,6 +29,7 @@ _FILAMENT = {
     "torque": ("force length", "twist torque of each node on the fluid, along the tangent"),
     "spin": ("1/time", "rate at which the first material director turns about the tangent, along it"),
 }
+ALONG_FRAME = ("moment", "strain")  # of a filament: components along e1, e2, e3, and not along x, y, z
 _LINK = {
     "first": ("length", "points on the first of what the link joins"),
     "second": ("length", "points on the second"),
@@ -52,6 +53,7 @@ _BODY = {
     "torque": ("force length", "torque of the body itself on the fluid, about its centre"),
     "reaction": ("force", "force that holds or moves the body, where its motion is given"),
     "reaction_torque": ("force length", "torque that holds or moves the body, about its centre"),
+    "markers": ("length", "positions of its markers, where they are of a file"),
 }
 _MOTOR = {
     "angle": ("1", "angle by which the rod has turned against the body since the start, rad"),

@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from ..errors import RunFileError
-from .column import Column
+from .column import CLOSED, Column
 from .opening import damaged, open_run_file
 from .ownership import is_being_written
 from .pace import pace_of
@@ -58,12 +58,18 @@ class RunFile:
         # Looked at first: a writer that ends after this has said in the file how.
         self._was_written = is_being_written(journal_path(self.path))
         self._opened, found = open_run_file(self.path)
-        self._file = self._opened.h5
         # The outputs that every dataset has; a writer may be at work on the last one.
         self._rows = min((rows for name, rows in found.items() if not name.startswith("grid/")), default=0)
         if not {"time", *_GROUPS} <= set(self._file):
             self.close()
             raise RunFileError(damaged(self.path))
+
+    @property
+    def _file(self) -> h5py.File:
+        """The file. Raises ValueError where it has been closed."""
+        if not self._opened.h5:
+            raise ValueError(CLOSED)
+        return self._opened.h5
 
     def close(self) -> None:
         """Close the file; arrays not read by now are lost."""
@@ -102,7 +108,10 @@ class RunFile:
 
     @cached_property
     def bodies(self) -> dict[str, dict[str, Column]]:
-        """Body -> name -> Column (T, 3): position, e1, e2, e3, velocity, spin, force, torque, and reactions if held."""
+        """Body -> name -> Column (T, 3): position, e1, e2, e3, velocity, spin, force, torque, and reactions if held.
+
+        Markers (T, k, 3) where these are of a file.
+        """
         return {name: self._columns(f"bodies/{name}") for name in self._file.get("bodies", {})}
 
     @cached_property

@@ -62,6 +62,7 @@ class BodySnapshot:
     torque: np.ndarray  # (3,) the same about its centre
     reaction: np.ndarray | None = None  # (3,) force that holds or moves it; None where it is free
     reaction_torque: np.ndarray | None = None  # (3,) the same, about its centre
+    markers: np.ndarray | None = None  # (k, 3) of a body whose markers are of a file
 
     @property
     def power(self) -> float:

@@ -11,11 +11,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy.linalg import solve_banded
-from scipy.linalg.lapack import dgbtrf, dgbtrs
 
 from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
+from .compiled import njit
+from .lapack import dgbtrf, dgbtrs, solve_banded
 from .vectors import NOT_NEGATIVE
 
 
@@ -28,34 +27,51 @@ class Profile(NamedTuple):
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def multiply(matrix, x):
-    """The product (n, m) of a band matrix with x (n, m)."""
-    n, m = matrix.shape[:2]
+def _multiply(matrix, flat, out):
+    n, m = out.shape
     w = (matrix.shape[2] // m - 1) // 2
-    out = np.zeros((n, m))
-    flat = x.ravel()
     for i in range(n):
-        low, high = max(0, i - w), min(n, i + w + 1)
+        low, high = (i - w if i > w else 0), (i + w + 1 if i + w < n else n)
         shift = (low - i + w) * m
         for a in range(m):
             s = 0.0
             for k in range((high - low) * m):
                 s += matrix[i, a, shift + k] * flat[low * m + k]
             out[i, a] = s
+
+
+def multiply(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The product (n, m) of a band matrix with x (n, m)."""
+    out = np.empty(x.shape)
+    _multiply(matrix, x.ravel(), out)
+    return out
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def multiply_each(matrix, x):
+    """The products (k, n, m) of a band matrix with each of x (k, n, m)."""
+    n, m = matrix.shape[:2]
+    w = (matrix.shape[2] // m - 1) // 2
+    out = np.zeros(x.shape)
+    flat = x.reshape(len(x), -1)
+    for i in range(n):
+        low, high = max(0, i - w), min(n, i + w + 1)
+        shift = (low - i + w) * m
+        for each in range(len(x)):
+            for a in range(m):
+                s = 0.0
+                for k in range((high - low) * m):
+                    s += matrix[i, a, shift + k] * flat[each, low * m + k]
+                out[each, i, a] = s
     return out
 
 
 @njit(cache=True, fastmath={"contract"})
-def transposed_product(matrix, full, factor):
-    """``factor`` K^T A (n, m, l) of a band matrix K and a full A (c n, l), c = 3 or 4: of K, the first c rows a node.
-
-    Three rows of A go into three of the product at a time, so that each number is fetched for three products.
-    """
-    n, m = matrix.shape[:2]
-    c, length, w = full.shape[0] // n, full.shape[1], (matrix.shape[2] // m - 1) // 2
-    out = np.zeros((n, m, length))
+def _transposed_product(matrix, full, factor, out):
+    n, m, length = out.shape
+    c, w = full.shape[0] // n, (matrix.shape[2] // m - 1) // 2
     for j in range(n):
-        for i in range(max(0, j - w), min(n, j + w + 1)):
+        for i in range(j - w if j > w else 0, j + w + 1 if j + w < n else n):
             at, row = (j - i + w) * m, (c * i) & NOT_NEGATIVE
             size = 0.0
             for a in range(c):
@@ -76,6 +92,15 @@ def transposed_product(matrix, full, factor):
                     x = matrix[i, a, at + b] * factor
                     for k in range(length):
                         out[j, b, k] += x * full[row + a, k]
+
+
+def transposed_product(matrix: np.ndarray, full: np.ndarray, factor: float) -> np.ndarray:
+    """``factor`` K^T A (n, m, l) of a band matrix K and a full A (c n, l), c = 3 or 4: of K, the first c rows a node.
+
+    Three rows of A go into three of the product at a time, so that each number is fetched for three products.
+    """
+    out = np.zeros((*matrix.shape[:2], full.shape[1]))
+    _transposed_product(matrix, full, factor, out)
     return out
 
 
@@ -134,7 +159,7 @@ def solve_pivoted(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     upper, diagonals = lapack_form(matrix)
     if not (np.isfinite(diagonals).all() and np.isfinite(right).all()):
         return np.full(right.shape, np.nan)
-    return solve_banded((upper, upper), diagonals, right.ravel(), check_finite=False).reshape(right.shape)
+    return solve_banded(upper, diagonals, right.ravel()).reshape(right.shape)
 
 
 def lapack_form(matrix: np.ndarray) -> tuple[int, np.ndarray]:

@@ -17,13 +17,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import bsr_array, csc_array, csr_array, eye_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from .banded import Profile
 from .blocks import inverse, less, less_times, part, product, put, put_part, take, times
+from .compiled import njit
 from .stiffness import Stiffness
 
 Solve = Callable[[np.ndarray], np.ndarray]  # right side (n, m) -> x (n, m)

@@ -6,7 +6,7 @@ for the other size is not compiled at all; ``unit`` is any tuple of m entries an
 
 from __future__ import annotations
 
-from numba import njit
+from .compiled import njit
 
 _SMALLEST = 1e-12  # a pivot, relative to what it is among
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+
+from .stiffness import Stiffness
 
 
 class Clamps(NamedTuple):
@@ -36,7 +37,7 @@ class Carried(NamedTuple):
     columns: np.ndarray  # (n, m, p)
     balance: np.ndarray  # (p, n m)
     external: np.ndarray  # (n, m) the loads within the forces on the nodes
-    external_change: Callable[[np.ndarray], np.ndarray] | None  # of (n, m) displacements; None: loads do not follow
+    external_stiffness: Stiffness | None  # of these loads; None: they follow nothing
     external_columns: np.ndarray  # (n, m, p)
     want: np.ndarray  # (p,)
     slope: np.ndarray  # (p, p)

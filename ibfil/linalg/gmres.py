@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse.linalg import LinearOperator, gmres
+
+from .lapack import dgetrf, dgetrs
 
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
 _LARGE = 2**24  # bytes of double precision beyond which factors are kept in single precision
@@ -168,6 +168,8 @@ def solve(product: Product, right: np.ndarray, blocks: Blocks, tolerance: float,
 
     Where rounding does not let it come so far, 1e-6 will do.
     """
+    from scipy.sparse.linalg import LinearOperator, gmres
+
     count, errors = 0, [np.inf]
 
     def measured(z: np.ndarray) -> np.ndarray:

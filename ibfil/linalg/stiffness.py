@@ -11,9 +11,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from . import banded
+from .compiled import njit
 
 NO_NODES = np.zeros(0, np.int64)
 
@@ -58,6 +58,14 @@ class Stiffness(NamedTuple):
         out = banded.multiply(self.band, x)
         if self.coupled:
             _add_products(*self.pairs, x, out)
+        return out
+
+    def times_each(self, x: np.ndarray) -> np.ndarray:
+        """K x (k, n, m) for each of x (k, n, m)."""
+        out = banded.multiply_each(self.band, np.ascontiguousarray(x))
+        if self.coupled:
+            for one, product in zip(x, out, strict=True):
+                _add_products(*self.pairs, one, product)
         return out
 
     def dense(self) -> np.ndarray:

@@ -6,7 +6,7 @@ count of references for every array.
 
 from __future__ import annotations
 
-from numba import njit
+from .compiled import njit
 
 # An index that may be negative is wrapped at every use, and a loop over it is not vectorised. Masked with this, one
 # that is not negative anyway is known to be so by the compiler too.

@@ -29,9 +29,15 @@ class Check:
     expected: str
     found: Value
     error: float
+    allowed: float  # the distance from what is expected that is allowed, in units of the number
     passed: bool
     source: str
     note: str = ""
+
+    def __repr__(self) -> str:
+        found = np.array2string(np.asarray(self.found), precision=6)
+        held = "passed" if self.passed else "failed"
+        return f"<{held}: {self.observe} = {found}, expected {self.expected}{'; ' * bool(self.note)}{self.note}>"
 
     def line(self) -> str:
         """One line for the user."""
@@ -62,7 +68,16 @@ def _check(name: str, expect: Expect, summary: Summary) -> Check:
         allowed, expected, doubt = _by_errors(expect, summary, allowed)
         error, note = abs(found - float(expect.value or 0.0)), "; ".join(filter(None, (note, doubt)))
     passed = bool(error <= allowed) and not note
-    return Check(name, expect.observe, expected, summary.value, error, passed, expect.source, note)
+    width = _width(expect, allowed)
+    return Check(name, expect.observe, expected, summary.value, error, width, passed, expect.source, note)
+
+
+def _width(expect: Expect, allowed: float) -> float:
+    """The distance that is allowed, in units of the number; of a range half of it."""
+    if expect.range is not None:
+        return 0.5 * (expect.range[1] - expect.range[0])
+    relative = expect.absolute is None and expect.standard_errors is None
+    return allowed * abs(expect.value) if relative and expect.value else allowed
 
 
 def _by_errors(expect: Expect, summary: Summary, widest: float) -> tuple[float, str, str]:

@@ -29,6 +29,11 @@ class Summary:
     error: Value | None = None
     doubt: str = ""
 
+    def __repr__(self) -> str:
+        error = "" if self.error is None else f" +- {np.array2string(np.asarray(self.error), precision=2)}"
+        said = [text for text in (self.note, self.quality, self.doubt) if text]
+        return f"<{'; '.join([np.array2string(np.asarray(self.value), precision=6) + error, *said])}>"
+
 
 class ObservableSet:
     """The observables of a run, and what they have seen."""
@@ -80,14 +85,14 @@ def _no_fit(times: np.ndarray, samples: np.ndarray) -> str:
 def summaries(
     observables: Mapping[str, Observable], times: np.ndarray, series: Mapping[str, np.ndarray]
 ) -> dict[str, Summary]:
-    """Return the number of every observable from its series; noted where the run ended before `over` did."""
+    """Return the number of every observable from its series; noted where they end before `over` does."""
     found = {}
     for name, observable in observables.items():
         over, end, note = getattr(observable, "over", None), float(times[-1]), ""
         samples = np.asarray(series[name], float)
         value: Value = float("nan") if samples.ndim == 1 else np.full(samples.shape[1:], np.nan)
         if over is not None and end < over[1] - 1e-9 * abs(over[1]):
-            note = f"the run ended at {end:.6g}, within `over` = {_shown(over)}"
+            note = f"seen until {end:.6g}, within `over` = {_shown(over)}"
         quality = ""
         if over is None or end >= over[0]:
             value = observable.summary(times, samples)

@@ -20,9 +20,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import StepFailed, Stopped
+from ..linalg.compiled import njit
 from .neighbour_search import Pairs, Segments, closest, search
 from .repulsion import Repulsion, farthest
 

@@ -22,8 +22,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..linalg.vectors import at, cross, mix, plus, put
 from .geometry import E1, E2, EDGE, LENGTH, O1, O2, R_S, R_SS, Configuration
 from .mesh import Mesh

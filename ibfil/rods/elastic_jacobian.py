@@ -9,12 +9,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..linalg.vectors import NOT_NEGATIVE, at, cross, dot, mix, plus, scaled
 from .elastic_force import Moment
 from .geometry import E1, E2, E3, EDGE, LENGTH, METRIC, O1, O2, R_S, R_SS, Configuration
 from .mesh import Mesh
+
+_FIRST = np.int64(0)  # numba compiles a function of a bare 0 once more than that of any index
 
 
 class _Node(NamedTuple):
@@ -48,7 +50,7 @@ class _Row(NamedTuple):
     psi: float
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _node(g, bend, bend_slope, old, i):
     """How node i changes: dO1 = -e2.x + O2 dpsi, dO2 = e1.x - O1 dpsi; the law's slopes; dP = O.dM + M.dO."""
     e1, e2, e3, r_s, r_ss = at(g, i, E1), at(g, i, E2), at(g, i, E3), at(g, i, R_S), at(g, i, R_SS)
@@ -149,7 +151,7 @@ def _add(row, flux, i, side, c):
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux):
     """Adds how f Q - P d/2 of every segment changes to ``flux`` (n, 2, m, 7)."""
-    after = _node(g, bend, bend_slope, old, 0)
+    after = _node(g, bend, bend_slope, old, _FIRST)
     for i in range(flux.shape[0] - 1):
         here, after = after, _node(g, bend, bend_slope, old, i + 1)
         if joined[i]:
@@ -163,7 +165,7 @@ def _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux):
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _twist_fluxes(joined, rest, g, bend, bend_slope, twist, twist_slope, old, flux):
     """Adds how M3 (X_i + X_{i+1})/2 and, to the torques, M3 of every segment change."""
-    after = _node(g, bend, bend_slope, old, 0)
+    after = _node(g, bend, bend_slope, old, _FIRST)
     for i in range(flux.shape[0] - 1):
         here, after = after, _node(g, bend, bend_slope, old, i + 1)
         if joined[i]:
@@ -246,11 +248,9 @@ def _twist_sources(mesh: Mesh, g, bend, bend_slope, old, matrix):
 @njit(cache=True)
 def _stiffness(joined, rest, stencils: Stencils, g, bend, bend_slope, stretching, old, least, flux, matrix):
     """The stiffness but for what is special to rods that twist; ``flux`` comes with what M3 adds to it, or zeros."""
-    n, m, columns = matrix.shape
-    by_node = matrix.reshape(n, m, columns // m, m)
     _bending_fluxes(joined, rest, g, bend, bend_slope, old, flux[1:])
-    _rows(stencils, flux, by_node)
-    _tension(joined, rest, g, bend, stretching, least, by_node)
+    _rows(stencils, flux, matrix)
+    _tension(joined, rest, g, bend, stretching, least, matrix)
 
 
 def stiffness(
@@ -276,13 +276,12 @@ def stiffness(
     Jacobian, 0 to leave compression out of the geometric stiffness (never out of the force).
     """
     n, m, columns = matrix.shape
-    flux = np.zeros((n + 1, 2, m, 7))
+    flux, by_node = np.zeros((n + 1, 2, m, 7)), matrix.reshape(n, m, columns // m, m)
     what = g.table, moment.bend, moment.bend_slope
     if m == 4:
-        by_node = matrix.reshape(n, m, columns // m, m)
         _twist_fluxes(mesh.joined, mesh.ds, *what, moment.twist, moment.twist_slope, start.table, flux[1:])
         _twist_sources(mesh, *what, start.table, by_node)
-    _stiffness(mesh.joined, mesh.ds, stencils, *what, stretching, start.table, least, flux, matrix)
+    _stiffness(mesh.joined, mesh.ds, stencils, *what, stretching, start.table, least, flux, by_node)
 
 
 def through_stencils(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..linalg.vectors import at, cross, dot, mix, plus, put
 
 

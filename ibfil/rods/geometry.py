@@ -7,8 +7,8 @@ r' and r'' by the stencils of mesh.py; e3 = r'/|r'| (Eq. 15), e2 = e3 x e1; O1 =
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..linalg.vectors import NOT_NEGATIVE, at, cross, dot, plus, put, scaled
 from .frame import transported
 from .mesh import Mesh
@@ -52,93 +52,67 @@ class Configuration:
     length = property(lambda self: self.table[:, LENGTH], doc="(n,) |d|; 1 where there is no segment")
 
 
-@njit(cache=True, inline="always")
-def _derivatives(mesh, g, i):
-    """r' and r'' at node i, from the positions in the table, through the stencils."""
-    r_s, r_ss = at(mesh.c1, i, 0), at(mesh.c2, i, 0)
-    first = mesh.first[i] & NOT_NEGATIVE
-    for k in range(mesh.w1.shape[1]):
-        r = at(g, first + k, R)
-        r_s = plus(r_s, mesh.w1[i, k], r)
-        r_ss = plus(r_ss, mesh.w2[i, k], r)
-    return r_s, r_ss
+@njit(cache=True, error_model="numpy")
+def _derive(mesh, g):
+    """Writes r', r'', |r'| and the unit tangents (Eq. 15), from the positions in the table through the stencils."""
+    for i in range(g.shape[0]):
+        r_s, r_ss = at(mesh.c1, i, 0), at(mesh.c2, i, 0)
+        first = mesh.first[i] & NOT_NEGATIVE
+        for k in range(mesh.w1.shape[1]):
+            r = at(g, first + k, R)
+            r_s = plus(r_s, mesh.w1[i, k], r)
+            r_ss = plus(r_ss, mesh.w2[i, k], r)
+        metric = np.sqrt(dot(r_s, r_s))
+        put(g, i, R_S, r_s)
+        put(g, i, R_SS, r_ss)
+        put(g, i, E3, (r_s[0] / metric, r_s[1] / metric, r_s[2] / metric))
+        g[i, METRIC] = metric
 
 
 @njit(cache=True, error_model="numpy")
-def tangents(mesh: Mesh, r):
-    """Unit tangents (n, 3) of the stencils, Eq. 15; NaN where r' vanishes."""
-    n = r.shape[0]
-    e3 = np.empty((n, 3))
-    for i in range(n):
-        r_s, _ = _derivatives(mesh, r, i)
-        put(e3, i, 0, scaled(1.0 / np.sqrt(dot(r_s, r_s)), r_s))
-    return e3
+def _complete(joined, ds, g):
+    """Writes what follows from these and e1: e2 and the curvatures O1 = -e2.r'', O2 = e1.r'' of every node, and of
 
-
-@njit(cache=True, inline="always")
-def _measure_node(g, i, r_s, r_ss, e1):
-    """Writes the frame, r', r'' and the curvatures of a node: O1 = -e2.r'', O2 = e1.r''."""
-    metric = np.sqrt(dot(r_s, r_s))
-    e3 = r_s[0] / metric, r_s[1] / metric, r_s[2] / metric
-    e2 = cross(e3, e1)
-    put(g, i, E1, e1)
-    put(g, i, E2, e2)
-    put(g, i, E3, e3)
-    put(g, i, R_S, r_s)
-    put(g, i, R_SS, r_ss)
-    g[i, METRIC], g[i, O1], g[i, O2] = metric, -dot(e2, r_ss), dot(e1, r_ss)
-
-
-@njit(cache=True, inline="always")
-def _measure_segments(mesh, g):
-    """Writes d, |d| and O3 = psi/ds of every segment, psi the turn of e1 about the rod (Eq. 39 has its sine):
+    every segment d, |d| and O3 = psi/ds, psi the turn of e1 about the rod (Eq. 39 has its sine):
 
     tan psi = (e2_a.e1_b - e2_b.e1_a)/(e1_a.e1_b + e2_a.e2_b)
 
     An e1 that is carried from e3_a to e3_b without spin (Eq. 41) has psi = 0.
     """
-    for i in range(g.shape[0]):
-        if mesh.joined[i]:
+    n = g.shape[0]
+    for i in range(n):
+        e1, r_ss = at(g, i, E1), at(g, i, R_SS)
+        e2 = cross(at(g, i, E3), e1)
+        put(g, i, E2, e2)
+        g[i, O1], g[i, O2] = -dot(e2, r_ss), dot(e1, r_ss)
+    for i in range(n):
+        if joined[i]:
             edge = plus(at(g, i + 1, R), -1.0, at(g, i, R))
             put(g, i, EDGE, edge)
             g[i, LENGTH] = np.sqrt(dot(edge, edge))
             e1, e2, e1_b, e2_b = at(g, i, E1), at(g, i, E2), at(g, i + 1, E1), at(g, i + 1, E2)
             sine = dot(plus(e2, 1.0, e2_b), plus(e1_b, -1.0, e1))  # small differences keep their digits
-            g[i, O3] = np.arctan2(sine, dot(e1, e1_b) + dot(e2, e2_b)) / mesh.ds[i]
+            g[i, O3] = np.arctan2(sine, dot(e1, e1_b) + dot(e2, e2_b)) / ds[i]
         else:
             put(g, i, EDGE, (0.0, 0.0, 0.0))
             g[i, LENGTH], g[i, O3] = 1.0, 0.0
 
 
-@njit(cache=True, error_model="numpy")
-def _measured(mesh: Mesh, r, e1):
-    n = r.shape[0]
-    g = np.empty((n, _COLUMNS))
-    for i in range(n):
-        put(g, i, R, at(r, i, 0))
-    for i in range(n):
-        r_s, r_ss = _derivatives(mesh, g, i)
-        _measure_node(g, i, r_s, r_ss, at(e1, i, 0))
-    _measure_segments(mesh, g)
-    return g
-
-
-@njit(cache=True, error_model="numpy")
-def _moved(mesh: Mesh, start, y):
+@njit(cache=True)
+def _moved(mesh: Mesh, start, y, g):
+    """Fills the table g; returns the smallest 1 + e3.e3' and its node."""
     n, m = y.shape
-    g = np.empty((n, _COLUMNS))
-    least, where = 2.0, 0
     for i in range(n):
         put(g, i, R, plus(at(start, i, R), 1.0, at(y, i, 0)))
+    _derive(mesh, g)
+    least, where = 2.0, 0
     for i in range(n):
-        r_s, r_ss = _derivatives(mesh, g, i)
-        e3 = scaled(1.0 / np.sqrt(dot(r_s, r_s)), r_s)
-        e1, one = transported(at(start, i, E1), at(start, i, E3), e3, y[i, 3] if m == 4 else 0.0)
+        e1, one = transported(at(start, i, E1), at(start, i, E3), at(g, i, E3), y[i, 3] if m == 4 else 0.0)
         if one < least or one != one:
             least, where = one, i
-        _measure_node(g, i, r_s, r_ss, e1)
-    _measure_segments(mesh, g)
-    return g, least, where
+        put(g, i, E1, e1)
+    _complete(mesh.joined, mesh.ds, g)
+    return least, where
 
 
 @njit(cache=True)
@@ -181,9 +155,25 @@ def turned(mesh: Mesh, start: Configuration, held: np.ndarray, y: np.ndarray) ->
     return _turned(mesh.joined, start.table, held, y)
 
 
+def _placed(mesh: Mesh, r: np.ndarray) -> np.ndarray:
+    """A table of nodes at r (n, 3), as far as it follows from that."""
+    table = np.empty((len(r), _COLUMNS))
+    table[:, R : R + 3] = r
+    _derive(mesh, table)
+    return table
+
+
+def tangents(mesh: Mesh, r: np.ndarray) -> np.ndarray:
+    """Unit tangents (n, 3) of the stencils at r (n, 3), Eq. 15; NaN where r' vanishes."""
+    return _placed(mesh, r)[:, E3 : E3 + 3].copy()
+
+
 def measure(mesh: Mesh, r: np.ndarray, e1: np.ndarray) -> Configuration:
     """Strains and spacing of the configuration r, e1 (n, 3); e1 is taken as normal to the stencils' tangents."""
-    return Configuration(_measured(mesh, r, e1))
+    table = _placed(mesh, r)
+    table[:, E1 : E1 + 3] = e1
+    _complete(mesh.joined, mesh.ds, table)
+    return Configuration(table)
 
 
 def moved(mesh: Mesh, start: Configuration, y: np.ndarray) -> tuple[Configuration, float, int]:
@@ -191,5 +181,6 @@ def moved(mesh: Mesh, start: Configuration, y: np.ndarray) -> tuple[Configuratio
 
     Also the smallest 1 + e3.e3' met, and its node: near zero a tangent has all but reversed.
     """
-    table, least, where = _moved(mesh, start.table, y)
+    table = np.empty((len(y), _COLUMNS))
+    least, where = _moved(mesh, start.table, y, table)
     return Configuration(table), least, where

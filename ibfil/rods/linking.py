@@ -15,7 +15,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from ..linalg.compiled import njit
 
 BESIDE = 1e-2  # of the shortest segment: how far beside the rod the second polygon is
 

@@ -15,9 +15,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..linalg.banded import Profile
+from ..linalg.compiled import njit
 from ..linalg.finite_differences import clamped_weights, ghost_weights, weights
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from ..linalg.compiled import njit
 
 _PARALLEL = 1e-14  # sin^2 of the angle below which two segments are parallel
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from .geometry import Configuration
 from .linearization import Linearization
 from .loads import ExternalLoad

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from scipy.spatial import cKDTree
 
 FINE = 0.1  # of the distance: how near to each other the points of a curve are that are looked at
 _FOLDED = 64  # cells a side
@@ -56,6 +55,8 @@ class Kept:
 
     def _distance(self, points: np.ndarray, others: np.ndarray) -> float:
         """The least distance of two clouds of points."""
+        from scipy.spatial import cKDTree
+
         if self._sides is None:
             return float(np.min(cKDTree(others).query(points)[0]))
         points, others = (np.mod(cloud, self._sides) % self._sides for cloud in (points, others))

@@ -23,16 +23,21 @@ def read_points(path: Path) -> np.ndarray:
     csv: divided by commas; empty lines and lines that begin with # are skipped, and so is a heading
     x,y,z[,e1x,e1y,e1z].
     """
+    return _checked(read_table(path, _NAMES))
+
+
+def read_table(path: Path, names: tuple[str, ...]) -> np.ndarray:
+    """The numbers of a csv or npy file, each row all of ``names``, or the first three. Raises ValueError as above."""
     if path.suffix.lower() not in (".csv", ".npy"):
         raise ValueError("must end in .csv or .npy")
     try:
-        table = _read_npy(path) if path.suffix.lower() == ".npy" else read_csv(path, _NAMES)
+        table = _read_npy(path) if path.suffix.lower() == ".npy" else read_csv(path, names)
     except OSError as error:
         raise ValueError(f"cannot be read ({error.strerror})") from None
-    if table.ndim != 2 or table.shape[1] not in (3, 6):
-        shape = " x ".join(map(str, table.shape))
-        raise ValueError(f"holds {shape} numbers; each row must be x, y, z or x, y, z, e1x, e1y, e1z")
-    return _checked(np.asarray(table, float))
+    if table.ndim != 2 or table.shape[1] not in (3, len(names)):
+        shape, rows = " x ".join(map(str, table.shape)), dict.fromkeys((", ".join(names[:3]), ", ".join(names)))
+        raise ValueError(f"holds {shape} numbers; each row must be {' or '.join(rows)}")
+    return np.array(table, float)
 
 
 def _read_npy(path: Path) -> np.ndarray:

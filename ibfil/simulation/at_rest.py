@@ -16,6 +16,7 @@ from ..timestepping.base import FAILURES
 from ..timestepping.linear_motion import LinearMotion
 from ..timestepping.spectrum import Modes, modes
 from ..timestepping.steady import SteadyFluid, frame_of
+from . import timescales
 
 if TYPE_CHECKING:
     from ..case.schema import Case
@@ -36,7 +37,7 @@ class SceneAtRest:
     def __init__(self, simulation: Simulation) -> None:
         refuse_driven(simulation.case)
         self.simulation, self.system = simulation, simulation.system
-        self.time = simulation.bending_time()
+        self.time = timescales.slowest_bending(simulation.model)
 
     @cached_property
     def fluid(self) -> SteadyFluid:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..assembly.bodies.clouds import size
+
 if TYPE_CHECKING:
     from ..bodies.body import Poses
     from .model import Model
@@ -21,7 +23,7 @@ def body_rate(model: Model, time: float) -> float:
     system = model.rods.with_bodies
     poses, length = system.rows.start(), system.length
     found = [0.0]
-    sizes = [float(np.mean(table.shape.semi_axes)) for table in model.case.bodies.values()]
+    sizes = [float(np.mean(size(model.case, name, body))) for name, body in model.case.each_body.items()]
     for b, body in enumerate(system.rows.bodies):
         force, torque = body.pushed(poses.axes[b], time)
         moved, turned = _drags(model, system.nodes[b], poses.centre[b])

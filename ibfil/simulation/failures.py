@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..linalg.compiled import njit
 from ..rods.geometry import Configuration
 from ..rods.mesh import Mesh
 
@@ -56,19 +56,19 @@ class Step(NamedTuple):
 def _survey(joined, twisting, ds, r, length, twist):
     """The largest and smallest |d|/ds, the largest |O3 ds|, the node of each; and the first node that is not finite."""
     high, low, turn = 0.0, np.inf, 0.0
-    where = np.zeros(3, np.int64)
+    longest = shortest = twisted = 0
     for i in range(joined.size):
         if not np.isfinite(r[i, 0] + r[i, 1] + r[i, 2]):
-            return high, low, turn, where, i
+            return high, low, turn, longest, shortest, twisted, i
         if joined[i]:
             q = length[i] / ds[i]
             if q > high:
-                high, where[0] = q, i
+                high, longest = q, i
             if q < low:
-                low, where[1] = q, i
+                low, shortest = q, i
             if twisting[i] and abs(twist[i] * ds[i]) > turn:
-                turn, where[2] = abs(twist[i] * ds[i]), i
-    return high, low, turn, where, -1
+                turn, twisted = abs(twist[i] * ds[i]), i
+    return high, low, turn, longest, shortest, twisted, -1
 
 
 class Diverged(NamedTuple):
@@ -120,12 +120,11 @@ def out_of_bounds(
 
     ``twisting`` (n,) is True at nodes of filaments that twist, ``stretching`` (n,) is EA at half nodes.
     """
-    high, low, turn, where, bad = _survey(
+    high, low, turn, longest, shortest, twisted, bad = _survey(
         mesh.joined, twisting, mesh.ds, configuration.r, configuration.length, configuration.twist
     )
     if bad >= 0:
         return Diverged(bad)
-    longest, shortest, twisted = (int(node) for node in where)
     if high > LONGEST:
         return OverStretched(longest, high, float(stretching[longest]))
     if low < SHORTEST:

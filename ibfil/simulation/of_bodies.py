@@ -32,6 +32,7 @@ def bodies(rods: RodStack, now: SolvedState) -> dict[str, BodySnapshot]:
             now.force[turn, :3] * rows.length,
             now.reaction[centre, :3].copy() if given else None,
             now.reaction[turn, :3] * rows.length if given else None,
+            None if body.cloud is None else poses.centre[b] + body.cloud @ poses.axes[b].T,
         )
     return out
 
@@ -52,7 +53,7 @@ def motors(rods: RodStack, now: SolvedState) -> dict[str, MotorSnapshot]:
 
 def wrench(rods: RodStack, now: SolvedState) -> tuple[np.ndarray, np.ndarray]:
     """Total force and torque (3,) on the fluid, about the origin, at the geometry at which the fluid was asked."""
-    rows, there, force = rods.with_bodies.rows, now.there or now.state.configuration, now.force
+    rows, there, force = rods.with_bodies.rows, now.there, now.force
     n, end = rows.n, rows.n + 2 * len(rows.bodies)
     moved, turned = force[n:end:2, :3], force[n + 1 : end : 2, :3]
     torque = np.cross(there.r[:n], force[:n, :3]).sum(axis=0) + np.cross(there.r[n:end:2], moved).sum(axis=0)

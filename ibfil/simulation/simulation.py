@@ -11,18 +11,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import CaseError, RunFailed
+from ..errors import RunFailed
 from ..rods.geometry import Configuration
 from ..rods.rates import Accepted
 from ..timestepping.base import FAILURES, State, Step
 from ..timestepping.stability_limit import explicit_limit
 from ..timestepping.step_control import Verdict
-from . import failures, steps, timescales
+from . import checkpoint, failures, steps, timescales
 from .diagnostics import Diagnostics
 from .driving.drivers import Drivers
 from .first_motion import Motion, first_motion
 from .model import assemble
 from .solved_state import SolvedState
+from .watch import Watch
 
 if TYPE_CHECKING:
     from ..assembly.stacked import RodStack
@@ -51,13 +52,13 @@ class Simulation:
         self._iterations = 0
         self._turn = threading.RLock()
         self.notices: list[str] = []  # what has happened and nobody was told yet
-        self._told = self._grown = False  # that the fluid moves too far in a step; that a disturbance grows too fast
         self._last: Motion | None = None
         self._there = self.start  # where the fluid was asked for them; kept up with where there are bodies
         self.drivers = Drivers(self.model)
         self.choice = steps.choose(self.model, self.drivers)
         self._control = self.choice.control
         self.limits = steps.StepLimits(self.model, self.drivers)
+        self._watch = Watch(self.model, self.limits)
 
     # -- what it is made of --------------------------------------------------------------------------------------
 
@@ -116,11 +117,6 @@ class Simulation:
         return self.model.nodes(name)
 
     @property
-    def filaments(self) -> tuple[str, ...]:
-        """Names of all filaments, copies one by one."""
-        return self.model.rods.names
-
-    @property
     def wisdom(self) -> str:
         """FFTW plans in use, as one line of text; empty where no step transforms a field."""
         if not self.model.transforms:
@@ -139,7 +135,7 @@ class Simulation:
         """
         with self._alone():
             if self.steps == 0:
-                self._watch(self.state_now)
+                self.notices += self._watch.contact(self.state_now, self.state_now)
             while self.time < until:
                 self.accept(*self._solve(self.limits.breaks.goal(self.time, until)))
                 after_step()
@@ -221,8 +217,7 @@ class Simulation:
             self._control.restart()
         self.fluid.advance(step.response, step.velocity, step.force)
         self.system.advance(Accepted(time, time - before.time, step.state.configuration))
-        self._look_at_crossing(time - before.time)
-        self._look_at_growth(time - before.time)
+        self.notices += self._watch.step(time, time - before.time)
         self._last = (step.velocity, step.force, step.reaction)
         self._there = step.there or self._there
         if self.steps > self.case.time.max_steps:
@@ -230,7 +225,7 @@ class Simulation:
             self._fail(failures.too_many(self.steps, limits.max_steps, limits.end, time - before.time))
         self._iterations = step.iterations
         self._look_at_bounds(step.state.configuration, time - before.time)
-        self._watch(before)
+        self.notices += self._watch.contact(before, self.state_now)
 
     def _look_at_bounds(self, configuration: Configuration, dt: float) -> None:
         rods = self.system
@@ -242,28 +237,6 @@ class Simulation:
         """The facts of a step that failed; the limit is that of the start, where the present is not finite."""
         limit = explicit_limit(self.system, self.model.inner, self.start, 0.0) if self.case.time.explicit else np.inf
         return failures.Step(dt, limit, self.case.thermal is not None and self.case.thermal.energy > 0)
-
-    def _look_at_crossing(self, dt: float) -> None:
-        """Tells, once, of a given step in which the fluid moves too far for its extrapolated advection."""
-        longest = self.fluid.longest_step()
-        if dt > longest and not self._told and self.longest_step() == np.inf:
-            self._told = True
-            self.notices.append(
-                f"time.step: at t = {self.time:.4g} the fluid crosses {dt / longest:.2g} cells in a step; advection "
-                f"is extrapolated, stable up to about one: take a step below {longest:.3g}"
-            )
-
-    def _look_at_growth(self, dt: float) -> None:
-        """Tells, once, of a given step too long for disturbances that have begun to grow since the start."""
-        rate = self.limits.begun
-        if rate and not self._grown and steps.is_long(dt, rate):
-            self._grown = True
-            self.notices.append(f"at t = {self.time:.4g}: {steps.too_long(dt, steps.OWN, rate)}")
-
-    def _watch(self, before: State) -> None:
-        """Looks for a contact since ``before``, where the case has [contact]."""
-        told = self.rods.contact.watch(before.configuration.r, self.configuration.r, before.time, self.time)
-        self.notices += [told] if told else []
 
     def _fail(self, trouble: failures.Failure) -> None:
         message, node, cause, remedy = trouble
@@ -287,89 +260,39 @@ class Simulation:
         """A drag per length across, for time scales: the case's own in RFT, 4 pi eta on a grid."""
         return self.model.fluid_model.drag(filament)
 
-    def bending_time(self) -> float:
-        """Relaxation time of the slowest bending mode of any filament."""
-        return timescales.slowest_bending(self.model)
-
     def explicit_limit(self) -> float:
         """The largest stable step of the explicit scheme now, 2/rho(M K), or less where nodes feel their velocity."""
         return explicit_limit(self.system, self.model.inner, self.configuration, self.time)
 
     # -- what is looked at ---------------------------------------------------------------------------------------
 
-    def _motion(self) -> Motion:
-        """Velocity, force on the fluid and reaction (n, m): of the step that led here, at the start of the first."""
+    def _solved(self) -> SolvedState:
+        """The present, with what the step that led here found; at the start, with what a first step finds."""
         if self._last is None:
             dt = min(self.step_length, self.longest_step())
             self._last = first_motion(self.model, self.state_now, dt)
-        return self._last
+        there = self._there if self.rods.bodies else self.configuration
+        return SolvedState(self.state_now, *self._last, self._iterations, self.shortened, there)
 
     def snapshot(self, fields: Sequence[str] = ()) -> Snapshot:
         """All filaments now, with diagnostics; velocities and forces are those of the step here, or of the first."""
         with self._alone():
-            there = self._there if self.rods.bodies else self.configuration
-            now = SolvedState(self.state_now, *self._motion(), self._iterations, self.shortened, there)
-            return self._diagnostics.snapshot(now, fields)
+            return self._diagnostics.snapshot(self._solved(), fields)
 
     # -- what must be kept ---------------------------------------------------------------------------------------
 
-    def state(self) -> dict[str, np.ndarray | float | int | str]:
+    def state(self) -> checkpoint.Stored:
         """All that is needed to go on bit for bit, also between two outputs."""
         with self._alone():
-            velocity, force, reaction = self._motion()
-        return {
-            "time": self.time,
-            "steps": self.steps,
-            "iterations": self._iterations,
-            # Whole: measured again from r and e1 it may differ in the last bit (compilers fuse a b + c as they like).
-            "shape": self.state_now.configuration.table,
-            "start": self.start.r,
-            "y_old": self.state_now.y_old,
-            "dt_old": self.state_now.dt_old,
-            "velocity": velocity,
-            "force": force,
-            "reaction": reaction,
-            **{f"control_{key}": value for key, value in self._control.state().items()},
-            **{f"limits_{key}": value for key, value in self.limits.state().items()},
-            **{f"fluid_{key}": value for key, value in self.fluid.memory().items()},
-            **{f"rods_{key}": value for key, value in self.system.memory().items()},
-            **self.rods.contact.state(),
-            **({"there": self._there.table} if self.rods.bodies else {}),
-            **({"laws": self._laws} if self._laws else {}),
-        }
+            return checkpoint.stored(self.model, self._solved(), self._control, self.limits, self._laws)
 
-    def restore(self, state: dict[str, np.ndarray | float | int | str]) -> None:
+    def restore(self, state: checkpoint.Stored) -> None:
         """Takes up a state that ``state`` gave.
 
         Raises CaseError where it was made with other laws from Python, or from a start shape that has changed since in
         the file or run it is read from.
         """
-        if state.get("laws", "") != self._laws:
-            found, wanted = self._laws or "none", state.get("laws") or "none"
-            raise CaseError([f"{self.case.file}: laws: found {found}; the run began with {wanted}"])
-        array = {k: np.ascontiguousarray(v) for k, v in state.items() if isinstance(v, np.ndarray)}
-        number = {k: float(v) for k, v in state.items() if not isinstance(v, (np.ndarray, str))}
-        self._same_start(array["start"])
-        configuration = Configuration(array["shape"])
-        self.state_now = State(number["time"], configuration, array["y_old"], number["dt_old"], int(number["steps"]))
-        self._last = (array["velocity"], array["force"], array["reaction"])
-        self._iterations = int(number["iterations"])
-        known: dict[str, np.ndarray | float] = {**array, **number}
-        control = {k.removeprefix("control_"): v for k, v in known.items() if k.startswith("control_")}
-        self.notices += [] if self._control.restore(control) else [steps.OTHER_STEPS]
-        self.limits.restore({k.removeprefix("limits_"): v for k, v in number.items() if k.startswith("limits_")})
-        if memory := {k.removeprefix("fluid_"): v for k, v in known.items() if k.startswith("fluid_")}:
-            self.fluid.recall(memory)
-        self.system.recall({k.removeprefix("rods_"): v for k, v in known.items() if k.startswith("rods_")})
-        self.rods.contact.restore(known)
-        if self.rods.bodies:
-            self._there = Configuration(array["there"])
-
-    def _same_start(self, began: np.ndarray) -> None:
-        """Clamps and tethers hold the start shape, so it must be the one the run began with."""
-        for name, where in zip(self.model.rods.names, self.model.rods.nodes, strict=True):
-            moved = float(np.max(np.linalg.norm(self.start.r[where] - began[where], axis=1)))
-            if moved > 1e-9 * self.system.length:  # another machine may differ in the last bits
-                found = f"a start shape that differs by {moved:.3g} from the one the run began with"
-                allowed = "the file or run it is read from, as it was"
-                raise CaseError([f"{self.case.file}: filament.{name}.shape: found {found}; allowed: {allowed}"])
+        now, told = checkpoint.taken_up(self.model, state, self._control, self.limits, self._laws)
+        self.state_now, self._iterations = now.state, now.iterations
+        self._last, self._there = (now.velocity, now.force, now.reaction), now.there
+        self.notices += told

@@ -20,4 +20,4 @@ class SolvedState(NamedTuple):
     reaction: np.ndarray
     iterations: int
     shortened: int
-    there: Configuration | None = None  # at which the fluid was asked; None: it does not matter, without bodies
+    there: Configuration  # at which the fluid was asked for bodies

@@ -128,7 +128,7 @@ class StepLimits:
 
     def __init__(self, model: Model, drivers: Drivers) -> None:
         time = model.case.time
-        self._drivers, self._follows = drivers, time.automatic or time.tolerance is not None
+        self._drivers, self.follows = drivers, time.automatic or time.tolerance is not None
         by_error = time.tolerance is not None
         self._points = POINTS_BY_ERROR if by_error else POINTS_A_PERIOD
         self._steady = not by_error  # whether a steady spin counts, which an error can tell
@@ -140,7 +140,7 @@ class StepLimits:
     def longest(self, state: State, steps: int, length: float) -> float:
         """The longest next step, after ``steps`` of them and where ``length`` is wanted; infinite if that may be."""
         rate = self.growth_rate(state, steps, length)
-        if not self._follows:
+        if not self.follows:
             return np.inf
         limit = 2 * np.pi / (self._points_of_growth * rate) if rate else np.inf
         return min(limit, self._driven(state.time, min(length, limit)))
@@ -155,7 +155,7 @@ class StepLimits:
     @property
     def begun(self) -> float:
         """The rate of growth that a given step has to be told of: found since the start; 0 where there is none."""
-        return 0.0 if self._follows or self.growth is None or self.growth.at_start else self.growth.rate
+        return 0.0 if self.follows or self.growth is None or self.growth.at_start else self.growth.rate
 
     def _driven(self, time: float, length: float) -> float:
         """The longest step for the driving within it: towards something fast, half of the way at a time."""

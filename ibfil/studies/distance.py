@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 _SAME = 1e-9  # of the last time: two outputs are at one time
+STRAIGHT = 1e-3  # of the size along, squared: a rod is nearly straight that is less wide (3 % of its length)
 
 
 def common_outputs(a: RunFile, b: RunFile) -> tuple[np.ndarray, np.ndarray]:
@@ -63,15 +64,16 @@ def rms_of_shape(a: RunFile, b: RunFile) -> tuple[np.ndarray, np.ndarray]:
 def superpose(p: np.ndarray, q: np.ndarray) -> tuple[float, float]:
     """Root mean square distance of points p (n, 3) from q moved and turned to fit best, and the angle of the turn.
 
-    Kabsch, Acta Cryst. A 32 (1976) 922; of the turns that fit equally well (a straight rod's about itself) the
-    smallest is not looked for: the angle is that between the longest principal axes then.
+    Kabsch, Acta Cryst. A 32 (1976) 922. How a nearly straight rod is turned about itself does not count: it moves its
+    nodes by no more than it is wide, and may be half a turn between two shapes that nearly agree. The angle is that
+    between the longest principal axes then.
     """
     p, q = p - p.mean(axis=0), q - q.mean(axis=0)
     u, sizes, vt = np.linalg.svd(q.T @ p)
     sign = np.sign(np.linalg.det(u @ vt))
     turn = u @ np.diag([1.0, 1.0, sign]) @ vt
-    # Planar points leave the sign of the third axis to this; lines, their turn about themselves to chance.
+    # Planar points leave the sign of the third axis to this.
     distance = float(np.sqrt(np.mean(np.sum((q @ turn - p) ** 2, axis=1))))
-    straight = sizes[1] < 1e-6 * sizes[0]
+    straight = sizes[1] < STRAIGHT * sizes[0]
     cosine = abs(float(u[:, 0] @ vt[0])) if straight else 0.5 * (float(np.trace(turn)) - 1.0)
     return distance, float(np.arccos(np.clip(cosine, -1.0, 1.0)))

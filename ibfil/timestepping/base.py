@@ -108,6 +108,25 @@ class NotConverged(StepFailed):
 FAILURES = (StepFailed, np.linalg.LinAlgError)  # of a step: it may be tried again
 
 
+def valueless(force: np.ndarray, response: Response, held: Prescribed) -> int | None:
+    """The first node at which a force (n, m), or else the flow, has no value: a move then has none anywhere."""
+    zero = np.zeros_like(force)
+    for values in (force, response.forced(zero, held, zero).move):
+        bad = np.nonzero(~np.isfinite(values).all(axis=1))[0]
+        if 0 < len(bad) < len(values):
+            return int(bad[0])
+    return None
+
+
+def require_values(move: np.ndarray, force: np.ndarray, response: Response, held: Prescribed) -> None:
+    """Raises NotConverged, and tells where, if a ``move`` (n, m) has no value by what it was found from."""
+    bad = ~np.isfinite(move).all(axis=1)
+    if bad.any():
+        where = valueless(force, response, held)
+        still = "the run diverged: a position is no finite number any more"
+        raise NotConverged(still, int(np.argmax(bad)) if where is None else where)
+
+
 class Stepper(Protocol):
     """One scheme."""
 

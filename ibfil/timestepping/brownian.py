@@ -16,9 +16,9 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 
 from ..fluids.base import Fluid, Response
+from ..linalg.compiled import njit
 from ..linalg.constraints import Prescribed
 from ..linalg.normal_numbers import Draw, NormalNumbers, Purpose
 from ..linalg.vectors import at, plus, put

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..fluids.base import Fluid, Response, Solution
+from ..linalg.compiled import njit
 from ..linalg.constraints import Prescribed
 from ..rods.geometry import Configuration
-from .base import FAILURES, Bodies, NotConverged, State, Step, StiffnessOf, System, _finish
+from .base import FAILURES, Bodies, NotConverged, State, Step, StiffnessOf, System, _finish, valueless
 
 # Newton's own error after a correction is some hundredth of it: an iterative solve need not be better than a tenth of
 # that. Nodes may differ: of many, one may be off by so many times the relative error of all.
@@ -55,14 +55,11 @@ class _Equation(NamedTuple):
         answer = self.response.implicit(force, matrix, held, y, self.target, ERROR)
         return answer, _size(answer.move, self.system.length)
 
-    def valueless(self, configuration: Configuration, otherwise: int) -> int:
-        """The first node at which a force, or else the flow, has no value: a correction then has none anywhere."""
-        force, _ = self.system.forces(configuration, self.time)
-        for values in (force, self.response.forced(np.zeros_like(force), self.held, self.target).move):
-            bad = np.nonzero(~np.isfinite(values).all(axis=1))[0]
-            if 0 < len(bad) < len(values):
-                return int(bad[0])
-        return otherwise
+    def valueless(self, configuration: Configuration, y: np.ndarray, otherwise: int) -> int:
+        """The first node at which a force, or else the flow, has no value, ``otherwise`` where all have one."""
+        force, inner = self.system.forces(configuration, self.time)
+        where = valueless(force, self.response, self.prescribed(y, configuration, inner))
+        return otherwise if where is None else where
 
 
 def _stride(move: np.ndarray, configuration: Configuration) -> float:
@@ -197,5 +194,5 @@ class Implicit:
         still = f"Newton's correction is still {size:.2g} of the length (allowed {self.tolerance:g})"
         if not np.isfinite(size):
             still = "the run diverged: a correction is no finite number"
-            worst = equation.valueless(configuration, worst)
+            worst = equation.valueless(configuration, y, worst)
         raise NotConverged(f"{still} after {count} iterations", worst)

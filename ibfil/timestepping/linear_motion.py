@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from ..linalg.constraints import Prescribed
+from ..linalg.stiffness import Stiffness
 from ..rods.geometry import Configuration
 from ..rods.system import RodSystem
 from .steady import SteadyFluid
@@ -86,6 +87,12 @@ class LinearMotion:
         )
         return bool(stirred.move.any())
 
+    @cached_property
+    def _definite(self) -> Stiffness:
+        """K without compression."""
+        _, inner = self.system.forces(self.configuration, self.fluid.time)
+        return self.system.definite_stiffness(self.configuration, self.configuration, inner, self.fluid.time)
+
     def elastic(self, x: np.ndarray) -> np.ndarray:
         """A_K x (k,)."""
         force = self.stiffness.times(self.whole(x))
@@ -117,12 +124,16 @@ class LinearMotion:
             out[:, column] = self.times(x)
         return out
 
-    def relaxation(self, tau: float) -> Callable[[np.ndarray], np.ndarray]:
-        """The map x -> (1 - tau A_K)^-1 x (k,): an implicit step of the fluid from displacements x."""
+    def relaxation(self, tau: float, definite: bool = False) -> Callable[[np.ndarray], np.ndarray]:
+        """The map x -> (1 - tau A_K)^-1 x (k,): an implicit step of the fluid from displacements x.
+
+        ``definite``: with the stiffness that leaves compression out, of linearly implicit steps.
+        """
         response = self.fluid.response(self.configuration.r, self.configuration.e3, self.fluid.time, tau)
+        matrix = self._definite if definite else self.stiffness
 
         def solved(target: np.ndarray) -> np.ndarray:
-            stiffness = self.stiffness if response.keeps else self.stiffness.copy()
+            stiffness = matrix if response.keeps else matrix.copy()
             move = response.implicit(self._zero, stiffness, self.held, self._zero, target).move
             out: np.ndarray = move.ravel()[self.free]
             return out

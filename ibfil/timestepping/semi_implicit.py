@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fluids.base import Fluid
-from .base import State, Step, System, _finish
+from .base import State, Step, System, _finish, require_values
 
 
 @dataclass(frozen=True)
@@ -20,14 +20,15 @@ class SemiImplicit:
     order: int = 1
 
     def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
-        """One force, one stiffness, one linear solve."""
+        """One force, one stiffness, one linear solve. Raises NotConverged where these have no value."""
         after = state.time + dt
         system.begin(dt, 0.0)
         force, inner = system.forces(state.configuration, after)
         matrix = system.definite_stiffness(state.configuration, state.configuration, inner, after)
-        zero = np.zeros(force.shape)
+        zero, held = np.zeros(force.shape), system.held(state.time, after)
         response = fluid.response(state.configuration.r, state.configuration.e3, after, dt)
-        answer = response.implicit(force, matrix, system.held(state.time, after), zero, zero)
+        answer = response.implicit(force, matrix, held, zero, zero)
+        require_values(answer.move, force, response, held)
         return _finish(system, state, dt, answer.move, answer.move / dt, answer, 1, response)
 
     def amplification(self, z: np.ndarray) -> np.ndarray:

@@ -34,6 +34,8 @@ def explicit_limit(
     while True:
         response = fluid.response(configuration.r, configuration.e3, time, dt)
         rest = response.forced(zero, held, zero).move
+        if not np.isfinite(rest).all():
+            return np.inf
 
         def moved(x: np.ndarray, response=response, rest=rest, dt=dt) -> np.ndarray:
             return (response.forced(matrix.times(x), held, zero).move - rest) / dt

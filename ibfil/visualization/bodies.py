@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.body_meshes import body_surfaces
+from ..analysis.meshes import PLAIN, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,13 +23,13 @@ LEGEND = "axes of bodies: first red, second green, third blue"
 CORNERS = 60  # of an outline
 
 
-def add_bodies(show: Callable[..., object], run: Run, output: int) -> None:
+def add_bodies(show: Callable[..., object], run: Run, output: int, view: View = PLAIN) -> None:
     """Adds the bodies of an output to a picture by ``show``, in place of those of another one."""
     import pyvista
 
     if not run.bodies:
         return
-    whole = pyvista.wrap(body_surfaces(run, run.snapshot(output)))
+    whole = pyvista.wrap(body_surfaces(run, run.snapshot(output), view))
     surface = whole.copy()
     surface.lines = np.zeros(0, int)
     show(surface, color=SURFACE, smooth_shading=True, specular=0.2, name="bodies")
@@ -54,18 +55,36 @@ def add_outlines(
     """
     from matplotlib.collections import LineCollection
 
+    each = run.case.each_body
     for name, columns in run.bodies.items():
-        size = np.array(run.case.bodies[name].shape.semi_axes)
-        if not size.any():
+        size = np.array(each[name].shape.semi_axes)
+        if "markers" in columns:
+            clouds = np.asarray(columns["markers"])[picked] - (np.ndim(origin) and np.asarray(origin)[:, None])
+            rings = [hull(cloud) for cloud in clouds[:, :, list(plane)]]
+        elif size.any():
+            centre = np.asarray(columns["position"])[picked] - origin
+            turned = np.stack([np.asarray(columns[key])[picked] for key in ("e1", "e2", "e3")], axis=1)
+            seen = (centre[:, list(plane)], size[:, None] * turned[:, :, list(plane)])
+            rings = [middle + outline(arms) for middle, arms in zip(*seen, strict=True)]
+        else:
             continue
-        centre = np.asarray(columns["position"])[picked] - origin
-        turned = np.stack([np.asarray(columns[key])[picked] for key in ("e1", "e2", "e3")], axis=1)
-        seen = (centre[:, list(plane)], size[:, None] * turned[:, :, list(plane)])
-        rings = [middle + outline(arms) for middle, arms in zip(*seen, strict=True)]
         lines = LineCollection(rings, cmap=colours, linewidths=1.2)
         lines.set_array(np.asarray(run.time)[picked])
         lines.set_clim(*span)
         axes.add_collection(lines)
+
+
+def hull(points: np.ndarray) -> np.ndarray:
+    """The outline (k, 2) of points in a plane, closed; of those along a line this line."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        corners = ConvexHull(points).vertices
+    except QhullError:
+        along = points @ np.linalg.svd(points - points.mean(axis=0))[2][0]
+        corners = np.array([along.argmin(), along.argmax()])
+    out: np.ndarray = points[np.append(corners, corners[0])]
+    return out
 
 
 def outline(arms: np.ndarray) -> np.ndarray:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -78,9 +80,10 @@ class PicturedRun(Run):
 
         _known(wishes, Wish._fields)
         try:
-            if path is None:
-                return _shown(lambda place: render(self.path, place, Wish(**wishes), overwrite=True))
-            return render(self.path, path, Wish(**wishes), overwrite=overwrite)
+            with _no_word_of_bars():
+                if path is None:
+                    return _shown(lambda place: render(self.path, place, Wish(**wishes), overwrite=True))
+                return render(self.path, path, Wish(**wishes), overwrite=overwrite)
         except CaseError as error:  # which names the arguments of the command line
             raise CaseError([fault.replace("--", "") for fault in error.faults]) from None
 
@@ -92,13 +95,22 @@ class PicturedRun(Run):
         """
         from .web.page import write_page
 
-        return write_page(self.path, path, colour=colour, most=most, log=lambda line: None, overwrite=overwrite)
+        with _no_word_of_bars():
+            return write_page(self.path, path, colour=colour, most=most, log=lambda line: None, overwrite=overwrite)
 
 
 def _known(wishes: Mapping[str, Any], fields: Sequence[str]) -> None:
     strange = [name for name in wishes if name not in fields]
     if strange:
         raise CaseError([f"{strange[0]}: found a wish of that name; allowed: {', '.join(fields)}"])
+
+
+@contextmanager
+def _no_word_of_bars() -> Iterator[None]:
+    """Within it pyvista may be loaded in a notebook without widgets, of which a bar that nobody sees would warn."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "IProgress not found")
+        yield
 
 
 def _shown(make: Callable[[Path], object]) -> Picture:

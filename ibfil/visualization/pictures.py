@@ -67,7 +67,7 @@ class Pictures:
         self.scale = self._scale()
         bars = [self.scale]
         if wish.flow in ("slice", "streamlines"):
-            most = words_with_unit("speed of the fluid", "length/time", run)
+            most = words_with_unit("speed of the fluid", "length/time", run.case.units)
             bars.append(Scale("", most, FLOW, 0.0, self.fastest, above=len(shown) > 1))
         notes = [_NOTES.get(wish.flow, "").format(self.fastest), _of_thickness(run)]
         notes += [_left_out(run)] if wish.montage else [_of_links(run, strongest), LEGEND if extents(run) else ""]
@@ -130,7 +130,7 @@ class Pictures:
 
     def _scale(self) -> Scale:
         if self.wish.montage:
-            times, words = self.run.time, words_with_unit("time", "time", self.run)
+            times, words = self.run.time, words_with_unit("time", "time", self.run.case.units)
             return Scale("time", words, TIMES, float(times[0]), float(times[-1]))
         return scale_of(self.run, self.wish.colour, limits_of(self.wish.range), self.shown[-1])
 

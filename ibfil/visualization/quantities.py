@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
 
     from ..analysis.run import Run
+    from ..case.schema import Units
 
 
 TIMES = "viridis"  # all eyes can order it
@@ -35,6 +36,11 @@ class Quantity(NamedTuple):
     signed: bool
     array: str
     components: tuple[int, ...] = ()
+
+    @property
+    def colours(self) -> str:
+        """The map of colours."""
+        return SIGNED if self.signed else TIMES
 
     def values(self, mesh: Any) -> np.ndarray:
         """The values (n,) at the points of a mesh of filaments."""
@@ -113,9 +119,9 @@ def colours(name: str) -> Colormap:
     return ListedColormap(found(np.linspace(0, 0.92, 256))) if name == TIMES else found
 
 
-def words_with_unit(words: str, dimension: str, run: Run) -> str:
+def words_with_unit(words: str, dimension: str, units: Units) -> str:
     """A label: "tension (pN)"."""
-    unit = label(run.case.units, dimension)
+    unit = label(units, dimension)
     return words if unit == "1" else f"{words} ({unit})"
 
 
@@ -145,6 +151,6 @@ def scale_of(run: Run, name: str, limits: str | tuple[float, float], last: int) 
         if not high - low > 1e-12 * max(abs(low), abs(high)):
             low, high = low - 1.0, high + 1.0
     slack = 1e-3 * (high - low)
-    shown = words_with_unit(quantity.words, quantity.dimension, run)
+    shown = words_with_unit(quantity.words, quantity.dimension, run.case.units)
     beyond = bool(every.min() < low - slack), bool(every.max() > high + slack)
-    return Scale(name, shown, SIGNED if quantity.signed else TIMES, low, high, *beyond)
+    return Scale(name, shown, quantity.colours, low, high, *beyond)

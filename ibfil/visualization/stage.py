@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.meshes import PLAIN, View, filament_data, link_lines
+from ..analysis.meshes import PLAIN, View, box_of, filament_data, link_lines
 from .bodies import add_bodies
 from .camera import Viewpoint
 from .quantities import QUANTITIES, Scale, colours
@@ -115,7 +115,7 @@ class Stage:
         mesh["shown"] = QUANTITIES[scale.name].values(mesh)
         self._add(mesh, scale, "rods")
         self._links(output)
-        add_bodies(self._show, self._run, output)
+        add_bodies(self._show, self._run, output, self._view)
 
     def shape(self, output: int, scale: Scale) -> bool:
         """One of many shapes in the same picture, coloured by its time, later ones in front; whether it is to scale."""
@@ -134,7 +134,10 @@ class Stage:
 
         if not self._run.links:
             return
-        lines, largest = pyvista.wrap(link_lines(self._run.snapshot(output))), max(self._strongest, 1e-300)
+        lines, largest = (
+            pyvista.wrap(link_lines(self._run.snapshot(output), box_of(self._run), self._view)),
+            max(self._strongest, 1e-300),
+        )
         self._show(
             lines,
             scalars="link_force",

@@ -122,11 +122,11 @@ class Collection:
             self.filaments.append((frame.time, file))
             if frame.links:
                 file = f"{self.run.stem}_links_{i:06d}.vtp"
-                _save(link_lines(frame), self.folder / file)
+                _save(link_lines(frame, box, self.view), self.folder / file)
                 self.links.append((frame.time, file))
             if frame.bodies:
                 file = f"{self.run.stem}_bodies_{i:06d}.vtp"
-                _save(body_surfaces(run, frame), self.folder / file)
+                _save(body_surfaces(run, frame, self.view), self.folder / file)
                 self.bodies.append((frame.time, file))
 
     def _add_fields(self, run: RunFile) -> None:

@@ -11,7 +11,7 @@ ParaView 5.12 and later open it. The layout is of Kitware's file format VTKHDF 2
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,21 +19,28 @@ import h5py
 import numpy as np
 
 from ..analysis.body_meshes import body_surfaces
-from ..analysis.meshes import PLAIN, View, box_of, field_data, link_lines, polylines, rods_of
+from ..analysis.meshes import PLAIN, Rod, View, box_of, field_data, link_lines, node_arrays, polylines, rods_of
 from ..errors import CaseError
 from ..io.overwriting import Kind, refuse, replacing
 from ..io.reader import RunFile
+from ..io.snapshots import FilamentSnapshot
+from .vtkhdf_layout import KINDS, Rows, add_cells, add_time, new_root
 
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkDataSet
 
 
+TOGETHER = 2**19  # nodes of all times whose arrays are made at once, some 60 MB
 VTKHDF = Kind("a file of VTKHDF", lambda path, head: head.startswith(b"\x89HDF") and b"VTKHDF" in head)
-_KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # of cells, in the order of the offsets
 
 
 def write_vtkhdf(
-    run: str | Path, folder: str | Path | None = None, *, wrap: bool = False, images: int = 0, every: int = 1
+    run: str | Path,
+    folder: str | Path | None = None,
+    *,
+    wrap: bool = False,
+    images: int = 0,
+    every: int = 1,
 ) -> list[Path]:
     """Write the run file ``run`` into ``folder``, by default the run's name, as VTKHDF; returns the paths.
 
@@ -54,13 +61,18 @@ def write_vtkhdf(
             return (snapshot for i, snapshot in enumerate(opened.snapshots()) if i % every == 0)
 
         paths = [_place(folder, run, "filaments")]
-        _write(paths[0], lambda file: _write_meshes(file, ((s.time, polylines(s, rods, box, view)) for s in shown())))
+        if view == PLAIN:
+            _write(paths[0], lambda file: _write_filaments(file, opened, rods, every))
+        else:
+            lines = ((s.time, polylines(s, rods, box, view)) for s in shown())
+            _write(paths[0], lambda file: _write_meshes(file, lines))
         if opened.links:
             paths.append(_place(folder, run, "links"))
-            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, link_lines(s)) for s in shown())))
+            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, link_lines(s, box, view)) for s in shown())))
         if opened.bodies:
             paths.append(_place(folder, run, "bodies"))
-            _write(paths[-1], lambda file: _write_meshes(file, ((s.time, body_surfaces(opened, s)) for s in shown())))
+            meshes = ((s.time, body_surfaces(opened, s, view)) for s in shown())
+            _write(paths[-1], lambda file: _write_meshes(file, meshes))
         if opened.grid is not None and len(opened.grid.time):
             paths.append(_place(folder, run, "grid"))
             _write(paths[-1], lambda file: _write_fields(file, opened))
@@ -78,23 +90,38 @@ def _write(path: Path, fill: Callable[[h5py.File], None]) -> None:
         fill(file)
 
 
-def _root(file: h5py.File, kind: str) -> h5py.Group:
-    root = file.create_group("VTKHDF")
-    root.attrs.create("Type", kind.encode("ascii"), dtype=h5py.string_dtype("ascii", len(kind)))
-    root.attrs["Version"] = np.array([2, 0], np.int64)
-    return root
+def _write_filaments(file: h5py.File, run: RunFile, rods: dict[str, Rod], every: int) -> None:
+    """The same as `_write_meshes` of their polylines, by many times of a filament at once."""
+    root = new_root(file, "PolyData")
+    offsets, times, rows = np.cumsum([0, *(len(rod.s) for rod in rods.values())]), run.time[::every], Rows(root)
+    count, none = int(offsets[-1]), np.zeros(4, np.int64)
+    empty = (np.zeros(1, np.int64), np.zeros(0, np.int64))
+    add_cells(rows, count, [(offsets, np.arange(count)) if kind == "Lines" else empty for kind in KINDS])
+    for number, time in enumerate(times):
+        add_time(rows, float(time), 0, number * count, none, none)
+    block = max(1, TOGETHER // count)
+    for first in range(0, len(times), block):
+        part = slice(first * every, min(first + block, len(times)) * every, every)
+        shown = [_shown(run.filaments[name], rod, part) for name, rod in rods.items()]
+        filament = np.repeat(np.arange(len(rods), dtype=np.int32), np.diff(offsets))
+        for name in shown[0]:
+            values = np.concatenate([arrays[name] for arrays in shown], axis=1)
+            rows.add(name, values.reshape(-1, *values.shape[2:]))
+        rows.add("PointData/filament", np.tile(filament, len(times[first : first + block])))
+    rows.write()
+    for name in root["PointData"]:
+        rows.add(f"Steps/PointDataOffsets/{name}", count * np.arange(len(times)))
+    rows.write()
+    root["Steps"].attrs["NSteps"] = len(times)
 
 
-def _append(group: h5py.Group, name: str, rows: np.ndarray) -> None:
-    """More rows of a dataset, which is made for the first ones."""
-    if name not in group:
-        chunk = max(1, min(len(rows), 2**18 // max(rows[:1].nbytes, 1)))
-        chunks = (chunk, *rows.shape[1:])
-        group.create_dataset(name, data=rows, maxshape=(None, *rows.shape[1:]), chunks=chunks)
-        return
-    dataset = group[name]
-    dataset.resize(len(dataset) + len(rows), axis=0)
-    dataset[len(dataset) - len(rows) :] = rows
+def _shown(columns: Mapping[str, Any], rod: Rod, part: slice) -> dict[str, np.ndarray]:
+    """Points and arrays (T, N, ...) of a filament at some of its outputs, by the names of their datasets."""
+    found = {key: column[part] for key, column in columns.items() if not key.startswith("reaction")}
+    arrays = node_arrays(FilamentSnapshot(**found, reaction_start=None, reaction_finish=None), rod)
+    points, shape = found["position"], found["position"].shape[:2]
+    wide = {k: np.broadcast_to(v, shape) if v.ndim == 1 else v for k, v in arrays.items()}
+    return {"Points": points} | {f"PointData/{k}": v.astype(np.float32) for k, v in wide.items()}
 
 
 def _cells(mesh: vtkDataSet, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -110,51 +137,29 @@ def _write_meshes(file: h5py.File, meshes: Iterator[tuple[float, vtkDataSet]]) -
     """A temporal PolyData: points of all times, and cells where they differ from those before."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
-    root = _root(file, "PolyData")
-    steps, data = root.create_group("Steps"), root.create_group("PointData")
-    begins = steps.create_group("PointDataOffsets")
-    for kind in _KINDS:
-        root.create_group(kind)
+    root = new_root(file, "PolyData")
+    rows = Rows(root)
     last: list[np.ndarray] = []
     part, points, cells, ids = -1, 0, np.zeros(4, np.int64), np.zeros(4, np.int64)
     new_cells, new_ids = np.zeros(4, np.int64), np.zeros(4, np.int64)
-    for count, (time, mesh) in enumerate(meshes, 1):
-        topology = [_cells(mesh, kind) for kind in _KINDS]
+    for time, mesh in meshes:
+        topology = [_cells(mesh, kind) for kind in KINDS]
         arrays = [array for pair in topology for array in pair]
         if not last or not all(np.array_equal(one, other) for one, other in zip(arrays, last, strict=True)):
             part, cells, ids, last = part + 1, cells + new_cells, ids + new_ids, [array.copy() for array in arrays]
             new_cells = np.array([len(offsets) - 1 for offsets, _ in topology])
             new_ids = np.array([len(each) for _, each in topology])
-            _append_topology(root, mesh.GetNumberOfPoints(), topology)
+            add_cells(rows, mesh.GetNumberOfPoints(), topology)
         values = mesh.GetPointData()
         for i in range(values.GetNumberOfArrays()):
             array = values.GetArray(i)
-            _append(data, array.GetName(), vtk_to_numpy(array))
-            _append(begins, array.GetName(), np.array([points]))
-        _append(root, "Points", vtk_to_numpy(mesh.GetPoints().GetData()))
-        _append_step(steps, time, part, points, cells, ids)
-        steps.attrs["NSteps"] = count
+            rows.add(f"PointData/{array.GetName()}", vtk_to_numpy(array))
+            rows.add(f"Steps/PointDataOffsets/{array.GetName()}", np.array([points]))
+        rows.add("Points", vtk_to_numpy(mesh.GetPoints().GetData()))
+        add_time(rows, time, part, points, cells, ids)
         points += mesh.GetNumberOfPoints()
-
-
-def _append_topology(root: h5py.Group, points: int, topology: list[tuple[np.ndarray, np.ndarray]]) -> None:
-    """A part: its cells of each kind."""
-    _append(root, "NumberOfPoints", np.array([points]))
-    for kind, (offsets, each) in zip(_KINDS, topology, strict=True):
-        _append(root[kind], "Offsets", offsets)
-        _append(root[kind], "NumberOfCells", np.array([len(offsets) - 1]))
-        _append(root[kind], "NumberOfConnectivityIds", np.array([len(each)]))
-        _append(root[kind], "Connectivity", each)
-
-
-def _append_step(steps: h5py.Group, time: float, part: int, points: int, cells: np.ndarray, ids: np.ndarray) -> None:
-    """A time: the part that it shows, and where its points begin, and its cells of each kind (4,)."""
-    _append(steps, "Values", np.array([time]))
-    _append(steps, "NumberOfParts", np.array([1]))
-    _append(steps, "PartOffsets", np.array([part]))
-    _append(steps, "PointOffsets", np.array([points]))
-    for name, begin in (("CellOffsets", cells), ("ConnectivityIdOffsets", ids)):
-        _append(steps, name, begin[None])
+    rows.write()
+    root["Steps"].attrs["NSteps"] = len(root["Steps/Values"])
 
 
 def _write_fields(file: h5py.File, run: RunFile) -> None:
@@ -163,9 +168,8 @@ def _write_fields(file: h5py.File, run: RunFile) -> None:
 
     grid = run.grid
     assert grid is not None
-    root = _root(file, "ImageData")
-    steps, data = root.create_group("Steps"), root.create_group("PointData")
-    begins = steps.create_group("PointDataOffsets")
+    root = new_root(file, "ImageData")
+    rows = Rows(root)
     for number, time in enumerate(np.asarray(grid.time)):
         image = field_data(run, number)
         if not number:
@@ -176,7 +180,8 @@ def _write_fields(file: h5py.File, run: RunFile) -> None:
         for i in range(arrays.GetNumberOfArrays()):
             array = arrays.GetArray(i)
             values = vtk_to_numpy(array)
-            _append(data, array.GetName(), values.reshape(1, *shape, *values.shape[1:]))
-            _append(begins, array.GetName(), np.array([number]))
-        _append(steps, "Values", np.array([float(time)]))
-        steps.attrs["NSteps"] = number + 1
+            rows.add(f"PointData/{array.GetName()}", values.reshape(1, *shape, *values.shape[1:]))
+            rows.add(f"Steps/PointDataOffsets/{array.GetName()}", np.array([number]))
+        rows.add("Steps/Values", np.array([float(time)]))
+    rows.write()
+    root["Steps"].attrs["NSteps"] = len(grid.time)

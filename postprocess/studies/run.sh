@@ -45,6 +45,14 @@ study locking stability swimmer_locked time.end=0.6283 time.step=0.0125664 outpu
 study explicit stability swimmer_rft time.end=0.01 output.every=0.002 time.scheme=explicit time.order=1 \
     'observe.speed.over=[0,0.01]' 'observe.sideways.over=[0,0.01]' \
     --vary filament.swimmer.nodes=11,16,21,31,41 --vary time.step=1e-4,3e-5,1e-5,3e-6,1e-6,3e-7
+# Growth that a scheme hides or makes up, foretold from the spectrum: a rod above its flutter, which grows at 4.6.
+study flailing_stability stability flailing parameters.F0=45 filament.rod.nodes=33 time.end=2.048 output.every=0.032 \
+    'observe.growth.over=[0.5,1]' 'observe.frequency.over=[0.5,1]' \
+    --vary 'time.scheme=implicit,implicit,semi-implicit&time.order=2,1,1' --vary time.step=0.001,0.002,0.004,0.008,0.016,0.032
+
+# Bending modulus, amplitude and bend at rest of a fibre from its tracked shapes, which tracked.py made: the truth is that of whip.toml.
+study whip_fit fit "$here/whip.toml" parameters.bending=300 parameters.amplitude=1.2 parameters.bend=0 --vary parameters.bending=10,1000 \
+    --vary parameters.amplitude=0.5,5 --vary parameters.bend=-0.1,0.1 --data "$here/tracked.csv"
 
 # An error bar on the swimmer's speed, and where it comes from.
 study swimmer_uncertainty uncertainty swimmer_stokes --meant
@@ -52,6 +60,13 @@ study swimmer_uncertainty uncertainty swimmer_stokes --meant
 # The cheapest step and nodes: for growth and frequency of a flailing rod, for the speed of the swimmer.
 study flailing_tune tune flailing --for growth=5% --for frequency=1%
 study swimmer_tune tune swimmer_stokes --for speed=2%
+
+# What a head costs a sperm cell, by its radius. heads.py draws them together.
+study head_none compare "$here/head.toml" body=absent filament.tail.start=absent --fluids rft,matched,free,stokes
+study head_0.075 compare "$here/head.toml" parameters.head=0.075 --fluids rft,matched,free,stokes
+study head_0.1 compare "$here/head.toml" parameters.head=0.1 --fluids rft,matched,free,stokes
+study head_0.15 compare "$here/head.toml" parameters.head=0.15 --fluids rft,matched,free,stokes
+study head_0.2 compare "$here/head.toml" parameters.head=0.2 --fluids rft,matched,free,stokes
 
 # Flutter of a clamped rod under a follower force: the threshold in resistive-force theory, and on grids in free space and in a box,
 # of rods 18, 27 and 36 hydrodynamic radii long. flutter.py draws them together.

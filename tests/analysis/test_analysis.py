@@ -149,6 +149,12 @@ def test_a_dataset_for_xarray(made):
         )
         np.testing.assert_array_equal(data["short_position"].sel(time=0.75), run.filaments["short"]["position"][3])
         np.testing.assert_array_equal(data["tip"].sel(xyz="y"), run.observables["tip"][:, 1])
+        assert data["long_moment"].dims == ("time", "long_node", "frame")
+        np.testing.assert_array_equal(data["long_strain"].sel(frame="e3"), run.filaments["long"]["strain"][:, :, 2])
+        position = run.filaments["long"]["position"]
+    for read in (lambda: position[-1], lambda: np.asarray(position), lambda: run.status):
+        with pytest.raises(ValueError, match=r"the run file is closed; ibfil\.open opens it again"):
+            read()
 
 
 def test_a_run_says_what_it_is_where_it_is_printed(made):

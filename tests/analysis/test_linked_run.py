@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.linked_scenes import ASKEW, LINKS, linked
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
-from ibfil.analysis.meshes import link_lines
+from ibfil.analysis.meshes import View, link_lines
 from ibfil.analysis.run import open_run
 from ibfil.case.reading import parse_case
 from ibfil.check.report import report
@@ -113,3 +114,14 @@ def test_check_tells_of_links_of_strain_and_of_stiffness():
     assert "link.stiff: strained by" in text
     assert "link.stiff: its stiffness times the step is" in text
     assert "links between filaments" in report(linked(ASKEW, {}))
+
+
+def test_in_a_box_lines_are_shown_whole_where_their_middle_is(done):
+    _, seen = done
+    box = np.array([0.3, 0.25, 0.2])
+    plain, wrapped = (vtk_to_numpy(link_lines(seen[0.1], box, View(wrap)).GetPoints().GetData()) for wrap in (0, 1))
+    by = (plain - wrapped).reshape(-1, 2, 3)
+    np.testing.assert_allclose(by / box, np.round(by / box), atol=1e-6)
+    np.testing.assert_array_equal(np.round(by[:, 0] / box), np.round(by[:, 1] / box))
+    assert np.abs(by).max() > 0.1
+    assert np.all(np.abs(wrapped.reshape(-1, 2, 3).mean(axis=1)) <= 0.5 * box + 1e-6)

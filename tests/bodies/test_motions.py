@@ -7,6 +7,7 @@ import pytest
 
 from ibfil.bodies import balance
 from ibfil.case.reading import parse_case
+from ibfil.check.bodies import of_body
 from ibfil.errors import CaseError
 from ibfil.simulation.simulation import Simulation
 
@@ -203,6 +204,7 @@ def test_a_joint_of_hinges_lets_its_rods_turn():
         for name, at, end in (("a", 0.0, "finish"), ("b", 0.5, "start"))
     )
     sim = scene(body("j", '{ kind = "joint" }', "force = [0, 3, 0]"), rods)
+    assert "free to move, while its rods turn about it" in of_body(sim.case, "j")
     sim.advance(0.5, lambda: None)
     now = sim.snapshot()
     a, b = now.filaments["a"].position, now.filaments["b"].position

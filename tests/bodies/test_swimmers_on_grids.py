@@ -192,7 +192,6 @@ def test_a_sphere_alone_is_moved_and_turned_against_its_drag():
 
 FAULTS = {
     "body.head: found markers at z = ": {"fluid": WALL, "up": 0.15},
-    'fluid.method: found "fft" in a scene with bodies; allowed: "table" or "auto"': {"fluid": BOX + '\nmethod = "fft"'},
     'fluid.precision: found "single" in a scene with bodies; allowed: "double"': {
         "fluid": FREE + '\nprecision = "single"'
     },

@@ -17,7 +17,7 @@ from ibfil.errors import CaseError
 # Pairs that no run can have, whatever the scene: each is refused in a line that names both.
 _APART = (
     "rft free,rft wall,rft inertia,rft fields,free fields,wall fields,free inertia,wall inertia,closed clamped,"
-    "thermal inertia,thermal mass,closed mass,body closed,body mass,body copies,body thermal"
+    "thermal inertia,thermal mass,closed mass,body closed,body mass,body thermal"
 )
 APART = {frozenset(pair.split()) for pair in _APART.split(",")}
 

@@ -91,8 +91,8 @@ CASES = {
         "allowed: another body, or no motor",
     ),
     "copies": (
-        ["filament.tail.copies={count=2,region=[[0,0,0],[1,1,1]]}"],
-        "filament.tail.copies: found copies of a filament in a body; allowed: a filament and a body for each",
+        ["filament.tail.copies={file='places.csv'}"],
+        "filament.tail.copies.file: found a file for copies of a filament in a body; allowed: count with region or at",
     ),
     "axes": (
         [f"{HEAD}.axes=[[1,0,0],[2,0,0]]"],

@@ -19,6 +19,6 @@ GIVEN = {
 @pytest.mark.parametrize("keys", GIVEN)
 def test_a_body_that_is_held_is_not_said_to_be_pushed_by_nothing(keys):
     more = f'[body.other]\nshape = {{ kind = "sphere", radius = 0.2 }}\nposition = [0, 2, 0]\n{keys}'
-    line = of_body("other", bacterium(FREE, more=more).case.bodies["other"])
+    line = of_body(bacterium(FREE, more=more).case, "other")
     for words in {BY_NOTHING, BY_HOLDING, *GIVEN[keys]}:
         assert (words in line) == (words in GIVEN[keys]), line

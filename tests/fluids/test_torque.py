@@ -18,7 +18,7 @@ from ibfil.rods.elastic_force import nodal_force
 from ibfil.rods.geometry import Configuration
 from ibfil.rods.mesh import Segmented
 from ibfil.rods.system import RodSystem
-from ibfil.rods.torque_free import TorqueFree
+from ibfil.rods.torque_free.mechanics import TorqueFree
 
 A1, A2, C, EA = 1.0, 0.3, 0.7, 50.0
 SIZES = (33, 65, 129)

@@ -48,10 +48,10 @@ def test_summaries_of_vectors_are_of_each_component():
 def test_a_window_that_the_run_did_not_finish_is_noted():
     keys = 'kind = "position"\nat = "finish"\nalong = [1, 0, 0]\nover = [2, 8]'
     _, summary = seen(keys, lambda t: tip_at(t, 0, 0), [0.0, 1.0, 2.0, 3.0])
-    assert summary == Summary(3.0, "the run ended at 3, within `over` = [2, 8]")
+    assert summary == Summary(3.0, "seen until 3, within `over` = [2, 8]")
     _, summary = seen(keys, lambda t: tip_at(t, 0, 0), [0.0, 1.0])
     assert np.isnan(summary.value)
-    assert "ended at 1" in summary.note
+    assert "until 1," in summary.note
 
 
 def test_times_that_differ_by_rounding_are_in_the_window():

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import doctest
+import re
+import shlex
 from pathlib import Path
 
 import pytest
 
 import ibfil
 from ibfil.case import library
+from ibfil.commands import main as command_line
 from postprocess import gallery
 
 TUTORIALS = sorted(path for path in (gallery.ROOT / "postprocess" / "tutorials").glob("*.md") if path.stem != "README")
@@ -43,8 +46,32 @@ def test_a_number_of_the_gallery_is_found_again(tmp_path, monkeypatch):
     assert (tmp_path / "end_moment.png").exists()
 
 
+def commands_as_python(text: str) -> str:
+    """A page for doctest: fences left out, and a command, ``$ ibfil ...``, as the call that prints what it prints."""
+    text = re.sub(r"^```.*$", "", text, flags=re.MULTILINE)
+    return re.sub(
+        r"^\$ ibfil (.*(?:\\\n.*)*)$", lambda found: f">>> command({_joined(found[1])!r})", text, flags=re.MULTILINE
+    )
+
+
+def _joined(line: str) -> str:
+    return " ".join(line.replace("\\\n", " ").split())
+
+
+def command(words: str) -> None:
+    """The command line in this process; its status is printed where it is not 0."""
+    status = command_line.main(shlex.split(words))
+    if status:
+        print(f"exit status {status}")
+
+
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
-def test_the_examples_of_a_tutorial_run(path: Path):
-    found = doctest.testfile(str(path), module_relative=False, encoding="utf-8")
+def test_the_examples_of_a_tutorial_run(path: Path, tmp_path, monkeypatch):
+    """In an empty folder, as a reader does; numbers are compared as they are shown."""
+    monkeypatch.chdir(tmp_path)
+    globs = {"command": command, "__name__": "__main__"}
+    page = doctest.DocTestParser().get_doctest(commands_as_python(path.read_text()), globs, path.stem, str(path), 0)
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    found = doctest.DocTestRunner(optionflags=flags).run(page)
     assert found.attempted > 0
     assert found.failed == 0

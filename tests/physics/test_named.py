@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import ibfil
+from ibfil.check.report import report
 from ibfil.check.warnings import warnings
 from ibfil.errors import CaseError, RunFailed
 from ibfil.simulation.simulation import Simulation
@@ -65,10 +66,12 @@ def test_diverged_or_over_stretched_by_a_step_above_the_explicit_limit():
     "key",
     ["filament.rod.loads.force=['0*x', '1 + 1e-9/(s - 0.5)', 0]", "fluid.flow=[0, 'where(abs(x) < 1e-3, 1/x, 0)', 0]"],
 )
-def test_the_node_where_a_load_or_a_flow_has_no_value_is_told(key):
+@pytest.mark.parametrize("scheme", ["explicit", "semi-implicit", "implicit"])
+def test_the_node_where_a_load_or_a_flow_has_no_value_is_told(key, scheme):
     """A correction has no value anywhere then, and node 0 was blamed."""
     straight = ["filament.rod.curvature=[0, 0]", "filament.rod.shape={kind='straight'}", "filament.rod.nodes=21"]
-    assert "on filament rod, node 10: " in str(failed(key, *straight, "time.step=1e-3"))
+    step = "1e-5" if scheme == "explicit" else "1e-3"
+    assert "on filament rod, node 10: " in str(failed(key, *straight, f"time.scheme={scheme}", f"time.step={step}"))
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
@@ -79,6 +82,9 @@ def test_where_a_force_has_no_value_the_limit_of_explicit_steps_is_not_sought_fo
     told = str(failed(key, *straight, "time.scheme=explicit", f"time.step={step}"))
     assert "no finite number" in told
     assert "limit" not in told
+    lines = report(ibfil.parse_case(ROD, "rod.toml", [key, *straight]))
+    assert "explicit scheme: no limit found: at the start shape" in lines
+    assert "dt = inf" not in lines
 
 
 @pytest.mark.parametrize("scheme", ["explicit", "semi-implicit", "implicit"])

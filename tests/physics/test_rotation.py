@@ -45,7 +45,7 @@ def resistance(case: Case) -> dict[str, np.ndarray]:
     g, fluid = simulation.start, simulation.fluid
     n = len(g.r)
     matrix = fluid.matrix(fluid.immersed.nodes(g.r, g.e3), fluid.immersed.own)
-    where = {name: simulation.nodes(name) for name in simulation.filaments}
+    where = {name: simulation.nodes(name) for name in simulation.rods.names}
     arms = np.zeros((n, 3))
     for name, nodes in where.items():
         arms[nodes] = g.r[nodes] - np.array(case.filaments[name].position)

@@ -11,7 +11,7 @@ from ibfil.rods.constitutive import Linear, gather
 from ibfil.rods.elastic_force import Moment, nodal_force
 from ibfil.rods.mesh import Segmented, stack
 from ibfil.rods.system import RodSystem
-from ibfil.rods.torque_free import TorqueFree
+from ibfil.rods.torque_free.mechanics import TorqueFree
 
 S = np.linspace(0.0, 1.0, 15) ** 1.2
 TANGENT = np.array([1.0, 0.2, 0.1]) / np.linalg.norm([1.0, 0.2, 0.1])

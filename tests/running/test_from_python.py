@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import pickle
 import sys
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ from helpers.runs import run
 import ibfil
 from ibfil.case.reading import differences
 from ibfil.case.toml import load
+from ibfil.observables.observers import Summary
 from ibfil.running.progress import Progress
 
 
@@ -37,6 +39,32 @@ def test_overrides_from_python_are_those_of_the_command_line_and_are_recorded(tm
     run(case(), path, overrides={"time.end": 1.0, **keys, "output.every": 0.5} | {"time.end": 1.0}, resume=True)
     with ibfil.open(path) as opened:
         assert np.array_equal(opened.time, [0.0, 0.25, 0.5, 1.0])
+
+
+def test_a_case_with_other_values_has_them_in_its_text_and_the_old_one_stays(tmp_path):
+    old = case()
+    new = old.with_({"time.end": 0.5, "output.every": 0.25, "observe.moved": None})
+    assert new.text == ibfil.read_case(old, ["time.end=0.5", "output.every=0.25", "observe.moved=absent"]).text
+    assert (old.time.end, new.time.end, new.file) == (1.0, 0.5, old.file)
+    run(new, tmp_path / "run.h5")
+    with ibfil.open(tmp_path / "run.h5") as opened:
+        assert differences(opened.case, new) == {}
+        assert opened.time[-1] == 0.5
+    assert pickle.loads(pickle.dumps(new)) == new
+    with pytest.raises(ibfil.CaseError, match=r"time\.end: found -1"):
+        old.with_({"time.end": -1})
+
+
+def test_no_other_way_changes_what_runs_and_not_what_is_recorded():
+    old = case()
+    told = r"case\.with_\("
+    for change in (lambda: old.model_copy(update={"title": "x"}), lambda: old.copy(update={"title": "x"})):
+        with pytest.raises(TypeError, match=told):
+            change()
+    for table, key in ((old, "title"), (old.time, "end"), (old.filaments["rod"], "length")):
+        with pytest.raises(AttributeError, match=told):
+            setattr(table, key, 2.0)
+    assert old.model_copy() == old
 
 
 def test_shipped_names_are_cases():
@@ -75,7 +103,9 @@ def test_a_notebook_is_shown_lines_and_tables(tmp_path):
     for shown, word in ((result.case, "a &lt;b&gt;"), (result, "<td>moved</td>")):
         assert word in shown._repr_html_()
         assert "<b>" not in shown._repr_html_()
+    assert repr(Summary(0.25, "seen until 1", error=0.1)) == "<0.25 +- 0.1; seen until 1>"
     with ibfil.open(path) as opened:
+        assert repr(opened.summaries["moved"]).startswith("<")
         assert "moved" in opened._repr_html_()
         assert "<b>" not in opened._repr_html_()
         assert opened.plot().png.startswith(b"\x89PNG")

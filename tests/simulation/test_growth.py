@@ -11,6 +11,7 @@ from helpers.scenes import RFT, scene
 from ibfil.check.report import report
 from ibfil.check.warnings import warnings
 from ibfil.fluids.resistive_force import mobilize
+from ibfil.simulation import timescales
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping.growth import growing
 
@@ -117,7 +118,7 @@ def test_steps_of_a_stiff_rod_under_a_feeble_load_grow_as_it_goes_to_rest() -> N
     """Its bending time is a hundredth of the time in which the load moves it: 400 steps where there were 9,958."""
     rod = {"length": 1.0, "nodes": 11, "bending": 1.0, "stretching": 1e3, "loads": {"weight": [0, 0, -1]}}
     simulation = Simulation(scene({"rod": rod, "other": {**rod, "position": [0.5, 0, 0.3]}}, RFT, end=10.0))
-    assert simulation.step_length == pytest.approx(simulation.bending_time() / 25)
+    assert simulation.step_length == pytest.approx(timescales.slowest_bending(simulation.model) / 25)
     told = report(simulation.case)
     assert "a 25th of the slowest bending time" in told
     assert "it grows, up to 0.5027 (the time in which loads or flow move a rod by its length)" in told

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from ibfil.case.reading import read_case
 from ibfil.commands import main
 from ibfil.studies.compare.fluids import known_fluids
 from ibfil.studies.settings import axis, combinations
 from ibfil.studies.tables import study_members
+from postprocess.studies import tracked
 
 HERE = Path(__file__).parents[2] / "postprocess" / "studies"
 RESULTS = sorted((HERE / "results").glob("*.json"))
@@ -54,8 +58,24 @@ def test_what_was_measured_says_when_with_what_and_where(path):
     assert not re.search(r'"[^"]*/(tmp|home|work)/', path.read_text())
 
 
-def test_the_error_bar_of_the_swimmer_took_at_most_twelve_of_its_runs():
-    """As recorded by the study, in processor time of one sitting; run.sh measures it again."""
+def test_the_swimmers_error_bar_has_all_of_its_runs():
     message = json.loads((HERE / "results" / "swimmer_uncertainty.json").read_text())
-    assert message["cost_in_base_runs"] <= 12
     assert message["failures"] == []
+
+
+def test_the_fit_of_tracked_shapes_has_the_truth_in_its_intervals():
+    truth = read_case(HERE / "whip.toml").parameters
+    with (HERE / "results" / "whip_fit.csv").open(newline="") as file:
+        found = {row["key"].partition(".")[2]: row for row in csv.DictReader(file)}
+    assert found.keys() == truth.keys()
+    for name, row in found.items():
+        assert float(row["low"]) < truth[name] < float(row["high"])
+        assert float(row["high"]) - float(row["low"]) < 0.1 * truth[name]
+
+
+def test_the_tracked_shapes_are_those_of_the_truth_with_noise():
+    there = (HERE / "tracked.csv").read_text().splitlines()
+    made = list(tracked.lines())
+    assert there[0] == made[0]
+    numbers = [np.array([line.split(",") for line in lines[1:]], float) for lines in (there, made)]
+    assert numbers[0] == pytest.approx(numbers[1], abs=2e-4)  # the last digit

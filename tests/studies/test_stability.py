@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import pytest
 from helpers.extremes import PLACE, STRETCH
@@ -78,6 +79,59 @@ def test_too_long_a_step_is_wrong_and_that_is_predicted(tmp_path):
     result = stability_study.stability(WAVE, [axis("time.step=0.2,0.02")], tmp_path, two, log=quiet)
     assert [(one.kind, one.predicted) for one in result.cells] == [("wrong", "wrong"), ("stable", "")]
     assert result.foretold == 2
+
+
+FLUTTERS = """
+[filament.rod]
+length = 1.0
+nodes = 9
+bending = 1.0
+stretching = 2e4
+anchor = "start"
+direction = [1, 0, 0]
+shape = { kind = "straight", perturb = ["0", "0", "0.01*s**2"] }
+start = { end = "clamped" }
+finish = { follower = -45.0 }
+[fluid]
+model = "rft"
+viscosity = 1.0
+drag = "paper"
+[time]
+end = 1.2
+step = 0.01
+[output]
+every = 0.1
+"""
+
+
+def test_growth_that_a_scheme_hides_or_makes_up_is_foretold_from_the_spectrum(tmp_path):
+    """A rod that flutters: no step here is long by the time scales of the case, which has nothing that drives."""
+    axes = [
+        axis("time.scheme=implicit,implicit,semi-implicit&time.order=2,1,1"),
+        axis("time.step=0.005,0.05"),
+    ]
+    result = stability_study.stability(FLUTTERS, axes, tmp_path, log=quiet)
+    assert [(one.kind == "stable", one.predicted) for one in result.cells] == [
+        (True, ""),
+        *[(False, "wrong")] * 5,
+    ]
+    assert result.foretold == 6
+    grows, hidden = result.cells[0].why, result.cells[3].why
+    assert re.fullmatch(r"growth \d\.\d+ at rest, \d\.\d+ by the step", grows)
+    assert re.fullmatch(r"growth \d\.\d+ at rest, -\d\.\d+ by the step", hidden)
+    less = ["filament.rod.finish.follower=-5", "time.step=0.05"]
+    decays = stability_study.stability(FLUTTERS, axes[:1], tmp_path / "b", less, log=quiet)
+    assert [(one.kind, one.predicted) for one in decays.cells] == [("stable", "")] * 3
+
+
+def test_the_prediction_is_that_of_ibfil_modes(tmp_path):
+    """The growth at rest and the one that a step shows are the numbers of `ibfil modes`."""
+    from ibfil.studies.modes.study import modes
+
+    result = stability_study.stability(FLUTTERS, [axis("time.step=0.05")], tmp_path, log=quiet)
+    leads = modes(FLUTTERS, None, ["time.step=0.05"], count=1, log=quiet).modes[0]
+    told = [float(word) for word in re.findall(r"-?\d+\.\d+", result.cells[0].why)]
+    assert told == pytest.approx([leads.value.real, leads.seen["order 2"].real], abs=2e-3)
 
 
 def test_the_explicit_scheme_ends_where_it_is_predicted_to(here, capsys):

@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from helpers.made_run import BENT
 
+from ibfil.case.reading import parse_case
 from ibfil.commands import main
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
 from ibfil.studies import sweep_figure
 from ibfil.studies.member import Member, Outcome
+from ibfil.studies.replicas import means
 from ibfil.studies.settings import Setting, axis, axis_of, combinations
 from ibfil.studies.sweep import Swept, sweep
 from ibfil.studies.tables import write_csv, write_json
@@ -208,6 +210,21 @@ def test_from_python(tmp_path):
     assert all(row.outcome.done and row.numbers["span"] > 0 for row in rows)
 
 
+def test_a_sweep_over_seeds_ends_with_means_and_their_standard_errors(here, capsys):
+    """Of each viscosity over its two seeds; without heat a seed is nothing to average over."""
+    vary = ["--vary", "fluid.viscosity=1,2", "--vary", "thermal.seed=1,2"]
+    heat = ["thermal.energy=1e-4", "filament.rod.derivative=2", "time.end=0.01", "time.step=0.001"]
+    assert main.main(["sweep", "bent.toml", *heat, *vary]) == 0
+    with open("bent-sweep/sweep.csv", newline="") as file:
+        spans = [float(row["span"]) for row in csv.DictReader(file)]
+    with open("bent-sweep/sweep_means.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["fluid.viscosity"], row["seeds"]) for row in rows] == [("1", "2"), ("2", "2")]
+    for row, pair in zip(rows, (spans[:2], spans[2:]), strict=True):
+        assert float(row["span"]) == pytest.approx(np.mean(pair), rel=1e-9)
+        assert float(row["span +-"]) == pytest.approx(abs(pair[1] - pair[0]) / 2, rel=1e-6)
+
+
 def test_tables_keep_all_digits_and_json_has_no_nan(tmp_path):
     write_csv(tmp_path / "t.csv", [{"a": 0.1 + 0.2}, {"b": "x,y", "a": None}])
     assert (tmp_path / "t.csv").read_text() == 'a,b\n0.30000000000000004,\n,"x,y"\n'
@@ -257,3 +274,19 @@ def test_faults_of_tables_of_points_are_one_line(tmp_path, content, told):
     with pytest.raises(CaseError) as caught:
         axis(f"@{table}")
     assert told in caught.value.faults[0]
+
+
+def test_runs_of_several_seeds_are_summed_up():
+    """Three of one scene, one of another temperature; a seed by its key, or by a parameter."""
+    key = BENT + "[thermal]\nenergy = 0.01\n"
+    named = BENT + "[parameters]\nmine = 1\n" + '[thermal]\nenergy = 0.01\nseed = "mine"\n'
+    for text, path in ((key, "thermal.seed"), (named, "parameters.mine")):
+        case = parse_case(text, "hot.toml")
+        runs = [
+            (case.with_({path: k}), {path: k, "x": 7}, {"far": value}) for k, value in ((1, 1.0), (2, 2.0), (3, 4.0))
+        ]
+        runs.append((case.with_({path: 1, "thermal.energy": 0.02}), {path: 1, "x": 8}, {"far": 100.0}))
+        (mean,) = means(runs)
+        assert mean.values == {"x": 7}
+        error = np.std([1.0, 2.0, 4.0], ddof=1) / np.sqrt(3)
+        assert mean.row() == {"x": 7, "seeds": 3, "far": pytest.approx(7 / 3), "far +-": pytest.approx(error)}

@@ -72,6 +72,15 @@ def test_a_grid_adds_the_place_in_a_cell_and_the_images_of_a_net_force(tmp_path)
     assert abs(bar.meant[0]) > abs(bar.corrected[0])  # an open fluid lets it sink faster
 
 
+def test_the_shell_of_a_body_on_a_grid_is_told_as_not_looked_at(tmp_path):
+    """The cells stay as they are, and with them its markers: the bar is a lower bound."""
+    short = ("filament.tail.nodes=9", "fluid.spacing=0.045", "time.end=1/16", "time.step=1/32", "output.every=1/32")
+    bar = bars("sperm_free", tmp_path, *short, observe=["along"])[0]["along"]
+    assert source(bar, "shells of bodies").estimate is None
+    assert not bar.whole
+    assert source(bar, "place in a cell").estimate is not None
+
+
 def test_a_number_that_the_levels_do_not_agree_on_is_none():
     three = Source("step", True, estimate([1.0, -0.5, 0.75], [4.0, 2.0, 1.0], 2.0, 1), "")
     assert study.nothing(-0.5, [three], 1.0).startswith("no number: its levels (step) are 1, -0.5, 0.75")

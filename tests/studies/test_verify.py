@@ -6,6 +6,8 @@ from helpers.made_run import BENT
 
 from ibfil.commands import main
 from ibfil.running import run as running_run
+from ibfil.studies.tables import with_bar
+from ibfil.studies.uncertainty.study import uncertainty
 
 TWO = (
     BENT
@@ -65,3 +67,57 @@ def test_verify_refuses_all_bad_cases_before_it_runs_one(here, capsys):
     assert out == ""
     assert "mute.toml: found no [expect] table" in err
     assert "viscosty" in err
+
+
+SWAYS = """
+[filament.rod]
+length = 1.0
+nodes = 11
+bending = 1.0
+stretching = 2e3
+start = { end = "clamped" }
+loads = { force = [0, 0, "4*cos(6*t)"] }
+[fluid]
+model = "rft"
+viscosity = 1.0
+[time]
+end = 0.2
+step = 0.02
+[output]
+every = 0.1
+[observe.tip]
+kind = "position"
+at = "finish"
+along = [0, 0, 1]
+[expect.wide]
+observe = "tip"
+value = VALUE
+tolerance = 0.3
+[expect.narrow]
+observe = "tip"
+value = VALUE
+absolute = 1e-5
+[expect.off]
+observe = "tip"
+range = [1.0, 2.0]
+"""
+
+
+def test_verify_with_bars_tells_what_ibfil_uncertainty_does_and_where_a_bar_is_wider_than_what_is_allowed(here, capsys):
+    (here / "sways.toml").write_text(SWAYS.replace("VALUE", "0.02"))
+    bar = uncertainty(str(here / "sways.toml"), here / "out", log=lambda line: None).bars[0]
+    (here / "sways.toml").write_text(SWAYS.replace("VALUE", repr(bar.value)))
+    assert main.main(["verify", "sways.toml", "--bars"]) == 1
+    wide, narrow, off, last = capsys.readouterr().out.splitlines()
+    found = f"found {with_bar(bar.value, bar.bar)}"
+    assert bar.bar > 1e-5
+    for line in (wide, narrow, off):
+        assert found in line
+    assert wide.startswith("ok ")
+    assert "wider" not in wide
+    assert narrow.startswith("ok ")
+    assert "the error bar is wider than the 1e-05 that is allowed" in narrow
+    assert off.startswith("FAIL")
+    assert last == "2 of 3 expected numbers found"
+    assert main.main(["verify", "sways.toml"]) == 1
+    assert f"found {bar.value:.6g}  " in capsys.readouterr().out

@@ -1,52 +1,89 @@
-"""The schemes that take one linear solve a step or none: their steps against the matrices themselves."""
+"""Small disturbances by the spectrum, against runs of every scheme, and what a scheme makes up or hides."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from helpers.scenes import scene
+from helpers.rests import CLAMPED, straight
+from helpers.scenes import RFT, scene
 
+from ibfil.simulation.at_rest import SceneAtRest
 from ibfil.simulation.simulation import Simulation
+from ibfil.timestepping.base import State, Stepper
+from ibfil.timestepping.implicit import Implicit
+from ibfil.timestepping.linear_steps import Course, Spectrum, apart
+from ibfil.timestepping.semi_implicit import SemiImplicit
 
-# Pressed together by 2 % and bent: its tension is negative all along.
-PRESSED = {
-    "length": 1.0,
-    "nodes": 9,
-    "derivative": 2,
-    "bending": 1.0,
-    "stretching": 1e3,
-    "shape": {"kind": "straight", "perturb": ["-0.02*s", "0.01*sin(6*s)", "0.01*s**2"]},
-}
+SMALL = 1e-6  # of the length
+SOFT = {"stretching": 400.0}
+PUSHED = {"start": CLAMPED, "finish": {"follower": -30.0}, "stretching": 400.0}
 
 
-def matrices(simulation: Simulation, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Z, the stiffness of that name (27, 27) and f (27,) of the rod as it starts."""
-    system, shape, drag = simulation.system, simulation.configuration, simulation.fluid.drag
-    force, moment = system.forces(shape, 0.0)
-    k = getattr(system, kind)(shape, shape, moment, 0.0).dense().reshape(27, 27)
-    z = np.zeros((9, 3, 9, 3))
-    for i, t in enumerate(shape.e3):
-        z[i, :, i] = drag.perp[i] * (np.eye(3) - np.outer(t, t)) + drag.par[i] * np.outer(t, t)
-    return z.reshape(27, 27), k, force.ravel()
+def after(rod: dict[str, Any], dt: float, steps: int, **time: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A disturbed rod at rest: its displacements (k,) at the start, after ``steps``, and the last as foretold."""
+    keys = scene({"rod": rod}, RFT, end=steps * dt, step=dt, **time)
+    here = Simulation(keys)
+    rest = SceneAtRest(here)
+    motion = rest.motion(rest.next_rest().configuration)
+    y = SMALL * np.random.default_rng(1).standard_normal(motion.shape).cumsum(axis=0)
+    y.ravel()[motion.held.at] = 0.0
+    run = Simulation(keys)
+    run.state_now = State(0.0, run.system.move(motion.configuration, y), np.zeros(y.shape), 0.0)
+    before = apart(motion, run.configuration)
+    assert before == pytest.approx(y.ravel()[motion.free], abs=1e-3 * SMALL)
+    run.advance(steps * dt, lambda: None)
+    foretold = Spectrum(motion).steps(run.model.stepper, dt).after(before, np.array([steps]))[0]
+    return before, apart(motion, run.configuration), foretold
 
 
-def test_a_semi_implicit_step_is_backward_euler_on_the_matrix_without_compression() -> None:
-    """(Z - dt K) y = dt f, long enough that with the compression in K the rod would buckle backwards."""
-    dt = 1.0
-    simulation = Simulation(scene({"rod": PRESSED}, scheme="semi-implicit", step=dt))
-    found = simulation.attempt(dt)
-    solved = []
-    for kind in ("definite_stiffness", "stiffness"):
-        z, k, force = matrices(simulation, kind)
-        solved.append(np.linalg.solve(z - dt * k, dt * force).reshape(9, 3))
-    assert found.state.y_old == pytest.approx(solved[0], rel=1e-9, abs=1e-12)
-    assert np.abs(solved[1] - solved[0]).max() > 1e-3
-    assert found.velocity == pytest.approx(solved[0] / dt, rel=1e-9, abs=1e-12)
+@pytest.mark.parametrize("rod", ["pushed", "twisting"])
+@pytest.mark.parametrize(
+    ("time", "dt", "steps", "within"),
+    [
+        ({"scheme": "implicit", "order": 1}, 0.02, 7, 1e-3),
+        ({"scheme": "semi-implicit", "order": 1}, 0.02, 7, 1e-3),
+        ({"scheme": "explicit", "order": 1}, 5e-6, 40, 1e-3),
+        ({"scheme": "implicit", "order": 2}, 2e-4, 200, 0.02),  # its first step is one of first order
+    ],
+    ids=["euler", "semi-implicit", "explicit", "bdf2"],
+)
+def test_it_is_what_a_run_does_with_a_small_disturbance(rod, time, dt, steps, within):
+    keys = straight(9, **(PUSHED if rod == "pushed" else {"start": CLAMPED, "twisting": 0.5, "radius": 0.1, **SOFT}))
+    before, found, foretold = after(keys, dt, steps, **time)
+    assert np.abs(found - before).max() > 0.03 * np.abs(before).max()
+    assert np.abs(found - foretold).max() < within * np.abs(found).max()
 
 
-def test_an_explicit_step_is_the_force_over_the_drag() -> None:
-    dt = 1e-6
-    simulation = Simulation(scene({"rod": PRESSED}, scheme="explicit", step=dt))
-    z, _, force = matrices(simulation, "stiffness")
-    y = simulation.attempt(dt).state.y_old
-    assert y == pytest.approx(dt * np.linalg.solve(z, force).reshape(9, 3), rel=1e-10, abs=1e-18)
+def test_semi_implicit_steps_make_growth_up_where_nothing_grows():
+    """A rod below its flutter: what steps of 0.03 still damp, steps of 0.1 let grow; backward Euler damps both."""
+    rod = straight(21, **{**PUSHED, "stretching": 2e5})
+    still = SceneAtRest(Simulation(scene({"rod": rod}, RFT, end=1.0, step=0.1)))
+    spectrum = Spectrum(still.motion(still.next_rest().configuration))
+    assert spectrum.leading.real < 0
+
+    def largest(scheme: Stepper, dt: float) -> float:
+        return float(np.exp(spectrum.steps(scheme, dt).rates.real.max()))
+
+    assert largest(SemiImplicit(), 0.03) < 0.99
+    assert largest(SemiImplicit(), 0.1) > 1.002
+    assert max(largest(Implicit(1), dt) for dt in (0.03, 0.1)) < 0.9
+
+
+def test_the_motion_itself_is_the_exponential_of_its_matrix():
+    from scipy.linalg import expm
+
+    still = SceneAtRest(Simulation(scene({"rod": straight(9, **PUSHED)}, RFT, end=1.0, step=0.1)))
+    motion = still.motion(still.next_rest().configuration)
+    x = np.random.default_rng(1).standard_normal(motion.free.size)
+    found = Spectrum(motion).itself().after(x, np.array([0.0, 0.05]))
+    assert found[0] == pytest.approx(x, rel=1e-9)
+    assert np.abs(found[1] - expm(0.05 * motion.matrix) @ x).max() < 1e-8 * np.abs(x).max()
+
+
+def test_a_start_far_beyond_all_numbers_is_told_as_such():
+    """Growth over many steps overflows, and says so by no number, without a warning."""
+    grown = Course(np.log(np.array([10.0 + 0j])), np.eye(1, dtype=complex)).after(np.ones(1), np.array([1, 1000]))
+    assert grown[0, 0] == pytest.approx(10.0)
+    assert not np.isfinite(grown[1, 0])

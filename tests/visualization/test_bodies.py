@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.runs import BODIES, FLUIDS, real, rod, run
 
+from ibfil.analysis import body_meshes
 from ibfil.analysis.body_meshes import BEYOND, body_surfaces, extents
+from ibfil.analysis.meshes import View
 from ibfil.analysis.run import open_run
 from ibfil.io.reader import RunFile
 from ibfil.visualization import render
@@ -16,7 +20,8 @@ from ibfil.visualization.pictures import Pictures, Wish
 from ibfil.visualization.run_figure import figure
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
-from ibfil.visualization.web.page import RING, _strokes, write_page
+from ibfil.visualization.web.constants import RING
+from ibfil.visualization.web.page import _strokes, write_page
 
 SIZE = np.array([0.2, 0.15, 0.1])
 
@@ -99,6 +104,27 @@ def test_an_outline_is_the_shadow_of_the_surface(path):
     seen = (found.points[of] - body.position)[:, [0, 2]]
     inside = np.einsum("ki,ij,kj->k", seen, inverse, seen)
     assert 0.98 < inside.max() < 1.0 + 1e-5
+
+
+def test_in_a_box_a_body_is_shown_whole_where_its_centre_is_and_in_each_image(path, monkeypatch):
+    import pyvista
+
+    box = np.array([0.5, 0.4, 3.0])
+    monkeypatch.setattr(body_meshes, "box_of", lambda run: box)
+    with RunFile(path) as file:
+        snapshot = file.snapshot(-1)
+        far = replace(snapshot.bodies["head"], position=np.array([1.3, -0.7, 0.1]))
+        snapshot = replace(snapshot, bodies=snapshot.bodies | {"head": far})
+        plain, wrapped, images = (
+            pyvista.wrap(body_surfaces(file, snapshot, view)) for view in (View(), View(True), View(True, 1))
+        )
+    of = plain["body"] == list(snapshot.bodies).index("head")
+    apart = (plain.points - wrapped.points)[of]
+    np.testing.assert_allclose(apart, np.tile([1.5, -0.8, 0.0], (of.sum(), 1)), atol=1e-6)
+    np.testing.assert_array_equal(plain.faces, wrapped.faces)
+    assert images.n_points == 27 * plain.n_points
+    assert images.n_cells == 27 * plain.n_cells
+    np.testing.assert_allclose(images.points, np.tile(wrapped.points, (27, 1)) + images["image"] * box, atol=1e-5)
 
 
 @pytest.mark.parametrize("co_moving", [False, True])

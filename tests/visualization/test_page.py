@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.browser import BROWSER
 from helpers.linked_scenes import ASKEW, LINKS, linked
 from helpers.made_run import BENT, make_run
 
@@ -20,8 +20,6 @@ from ibfil.commands.main import main
 from ibfil.errors import CaseError
 from ibfil.visualization.web.page import write_page
 
-BROWSERS = ("chromium", "chromium-headless-shell", "google-chrome", "chrome")
-BROWSER = next((found for name in BROWSERS if (found := shutil.which(name))), None)
 browses = pytest.mark.skipif(BROWSER is None, reason="no Chromium here: pages are parsed, and opened in no browser")
 HOSTILE = '</script><script>document.title="owned"</script><img src=x onerror=alert(1)> & "quotes"'
 

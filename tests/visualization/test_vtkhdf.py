@@ -18,7 +18,7 @@ from ibfil.analysis import meshes
 from ibfil.commands.main import main
 from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
-from ibfil.visualization import vtkhdf
+from ibfil.visualization import vtkhdf, vtkhdf_layout
 from ibfil.visualization.vtk_files import write_vtk
 from ibfil.visualization.vtkhdf import write_vtkhdf
 
@@ -69,6 +69,16 @@ def test_filaments_are_those_of_the_run_at_every_time(run, tmp_path, view):
         assert read.times == opened.time.tolist()
         for number in (0, 3, 1, 4, 2):  # in any order
             same(read.at(number), meshes.filament_data(opened, number, view))
+
+
+def test_filaments_are_written_some_times_at_once_and_only_every_nth(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(vtkhdf, "TOGETHER", 40)  # two times of 16 nodes
+    monkeypatch.setattr(vtkhdf_layout, "BLOCK", 3000)
+    read = Read(write_vtkhdf(run, tmp_path, every=2)[0])
+    with RunFile(run) as opened:
+        assert read.times == opened.time[::2].tolist()
+        for number in range(3):
+            same(read.at(number), meshes.filament_data(opened, 2 * number))
 
 
 def test_lines_may_change_from_time_to_time(tmp_path):

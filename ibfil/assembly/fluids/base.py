@@ -90,6 +90,10 @@ class FluidModel(ABC):
     def refuse(self, r: np.ndarray) -> None:  # noqa: B027  (most fluids have no end)
         """Nothing; raises StepFailed where nodes r (n, 3) have left the fluid, so that a step is not taken."""
 
+    def solved(self, rods: RodStack) -> list[str]:
+        """Lines on the system that a step solves; none where there is nothing to tell."""
+        return []
+
     def method(self, rods: RodStack) -> str:
         """How velocities are found."""
         return self.case.fluid.model

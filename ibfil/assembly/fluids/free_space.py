@@ -48,7 +48,7 @@ class FreeModel(ImmersedModel):
         from ...fluids import stokes
 
         if rods.bodies:
-            return self.with_bodies(rods)
+            return self.with_bodies(rods, immersed, method, None if method == "table" else self.solver())
         if method == "table":
             return stokes.StokesByTable(immersed)
         if method == "krylov":
@@ -86,13 +86,13 @@ class FreeModel(ImmersedModel):
         """Cells of the transforms at the start."""
         from ...grid.free_fft import padded
 
-        base, _ = self.space.stencil(self.kernel, rods.start.r)
+        base, _ = self.space.stencil(self.kernel, self.reached(rods))
         return [padded(int(n)) for n in np.ptp(base, axis=0) + self.kernel.points]
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         if rods.bodies:
-            return self.by_table(rods)
+            return self.with_markers(rods, {"fft": self.evaluation(rods)})
         counts = [where.stop - where.start for where in rods.nodes]
         return costs.without_box(self.case, counts, self.components, self.evaluation(rods))
 

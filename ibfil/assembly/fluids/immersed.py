@@ -14,14 +14,14 @@ from .. import costs
 from .. import grid as grids
 from ..drag import drag
 from . import grid_warnings, shells
-from .base import FluidModel, Term
+from .base import Term
+from .immersed_bodies import ImmersedBodiesModel
 
 if TYPE_CHECKING:
     from ...case.filament import Filament
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.resistive_force import Drag
-    from ...fluids.spaces.base import Space
     from ...grid.kernels import Kernel
     from ...timestepping.brownian import Drift
     from ..stacked import RodStack
@@ -32,23 +32,13 @@ BAND = "band matrix"
 MOST_NODES = 400  # of a rod whose drag on turning is solved for: a dense system of three times as many
 
 
-class ImmersedModel(FluidModel):
+class ImmersedModel(ImmersedBodiesModel):
     """A fluid that nodes push through a discrete delta kernel."""
 
     @cached_property
     def kernel(self) -> Kernel:
         """The discrete delta kernel."""
         return grids.kernel(self.case)
-
-    @property
-    def components(self) -> int:
-        """How many numbers of a node go through the fluid: 3, or 4 with its twist torque."""
-        return 4 if self.case.couples_torque else 3
-
-    @property
-    @abstractmethod
-    def space(self) -> Space:
-        """The space it fills. Raises CaseError where that cannot be made."""
 
     # -- the fluid itself
 
@@ -95,47 +85,12 @@ class ImmersedModel(FluidModel):
 
         return ImmersedBodies(*parts, shells=shells.shells(case, rods, case.fluid.kernel, space.spacing))
 
-    lowest_marker = -np.inf  # the height below which markers of bodies may not come
-
-    def with_bodies(self, rods: RodStack) -> Fluid:
-        """The fluid about rods and bodies, by the exact table."""
-        from ...fluids.shells.stokes import ImmersedBodies, StokesWithBodies
-
-        immersed = self.immersed(rods)
-        assert isinstance(immersed, ImmersedBodies)
-        return StokesWithBodies(immersed, self.lowest_marker)
-
-    def ingredients(self, rods: RodStack, fluid: Fluid) -> Immersed:
-        """The ingredients of a fluid: with bodies those that it has, whose tables serve; else made anew."""
-        if not rods.bodies:
-            return self.immersed(rods)
-        from ...fluids.shells.navier_stokes import NavierStokesWithBodies
-        from ...fluids.shells.stokes import StokesWithBodies
-
-        assert isinstance(fluid, StokesWithBodies | NavierStokesWithBodies)
-        return fluid.pushing
-
-    def markers(self) -> int:
-        """How many markers the bodies have."""
-        fits = (shells.fit(self.case, name, self.case.fluid.kernel, self.space.spacing) for name in self.case.bodies)
-        return sum(len(found.markers) for found in fits if found is not None)
-
     def method(self, rods: RodStack) -> str:
         """The case's, or the cheapest by counts."""
-        if rods.bodies:
-            return "table"
         if self.case.fluid.method != "auto":
             return self.case.fluid.method
         seconds = self.seconds(rods)
         return min(seconds, key=lambda name: seconds[name])
-
-    def by_table(self, rods: RodStack, pair: float = 1.0, inertia: float = 0.0) -> dict[str, float]:
-        """Seconds of a step with bodies, from counts: the table of nodes and markers, whose system is that of nodes.
-
-        ``pair`` is what a pair costs, over what it does in the periodic table, ``inertia`` what a fluid's own takes.
-        """
-        more = inertia if self.case.fluid.inertial else 0.0
-        return {"table": more + costs.with_markers(self.case, rods.count, self.markers(), self.components, pair)}
 
     def transforms(self, rods: RodStack) -> bool:
         """All methods but the table do."""
@@ -197,11 +152,15 @@ class ImmersedModel(FluidModel):
 
     def memory(self, rods: RodStack) -> dict[str, float]:
         """The mobility table, and what solves with it."""
-        n, m, method = rods.count + self.markers(), rods.system.unknowns, self.method(rods)
+        n, m, method = rods.count + sum(self.markers), rods.system.unknowns, self.method(rods)
         out = {"mobility table": self._number * self.table_entries()}
+        if rods.bodies:
+            out["bodies by nodes"] = 5 * 8.0 * rods.count * m * (6 * len(rods.bodies) + len(rods.motors))
         if method == "krylov":
             kept = 2 * 8.0 * n * m * m * (2 * rods.system.profile.width + 1)  # the stiffness of factors, and a copy
-            out["preconditioner"] = bytes_of(self.components * k for k in rods.group_sizes) + kept
+            alone = [sum(both) for both in self.counts(rods)] if rods.bodies else None
+            blocks = bytes_of(self.components * k for k in alone or rods.group_sizes)
+            out["preconditioner"] = (4 if alone else 1) * blocks + kept
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
             out["dense matrices"] = costs.dense_bytes(n, self.components)
@@ -291,7 +250,8 @@ class ImmersedModel(FluidModel):
 
     def warnings(self, scene: Scene) -> list[str]:
         """Bodies that the grid tells badly."""
-        return shells.warnings(self.case, self.case.fluid.kernel, self.space.spacing, self.box)
+        dense = self.method(scene.rods) != "krylov"
+        return shells.warnings(self.case, self.case.fluid.kernel, self.space.spacing, self.box, dense)
 
     # -- pictures and recorded runs
 

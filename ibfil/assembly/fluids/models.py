@@ -8,6 +8,7 @@ from .base import FluidModel
 from .free_space import FreeModel
 from .navier_stokes import NavierStokesModel
 from .resistive_force import ResistiveForceModel
+from .shared import among
 from .stokes import StokesModel
 from .wall import WallModel
 
@@ -24,5 +25,5 @@ MODELS: dict[str, type[FluidModel]] = {
 
 
 def fluid_model(case: Case) -> FluidModel:
-    """The model of the fluid that the case names."""
-    return MODELS[case.fluid.kind](case)
+    """The model of the fluid that the case names. Raises CaseError where processes have nothing of it to share."""
+    return among(MODELS[case.fluid.kind], case)

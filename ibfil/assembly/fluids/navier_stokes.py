@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,28 +54,21 @@ class NavierStokesModel(GridModel):
 
     def fluid(self, rods: RodStack, immersed: Immersed, method: str) -> Fluid:
         """The fluid, its forces answered by ``method``; what transforms whole fields shares one room for it."""
-        from ...fluids import stokes
         from ...fluids.background_flow import Background
         from ...fluids.navier_stokes import NavierStokes, Workspace
+        from ...fluids.stokes import StokesSolve
         from ...fluids.torque_coupling import TorqueStokesSolve
 
         threads = self.case.compute.threads
         workspace = Workspace(self.grid, immersed.coupling.grid_vectors, threads, immersed.number)
         shared = workspace.flow if immersed.number is np.float64 else None  # solvers by FFT are exact to round-off
-        factor_cost = self.factor_cost(rods)
 
-        def operator(alpha: float) -> Tabulated:
-            if method == "table":
-                return stokes.StokesByTable(immersed, alpha)
-            solver: Solver
+        def solver(alpha: float) -> Solver:
             if immersed.coupling.grid_vectors == 1:
-                solver = stokes.StokesSolve(self.grid, immersed.viscosity, threads, alpha=alpha, transform=shared)
-            else:
-                solver = TorqueStokesSolve(self.grid, immersed.viscosity, threads, alpha, shared)
-            if method == "krylov":
-                return stokes.StokesByKrylov(immersed, solver, factor_cost, alpha)
-            return stokes.StokesByFFT(immersed, solver, alpha)
+                return StokesSolve(self.grid, immersed.viscosity, threads, alpha=alpha, transform=shared)
+            return TorqueStokesSolve(self.grid, immersed.viscosity, threads, alpha, shared)
 
+        operator = self.operators(rods, immersed, method, solver)
         background = None
         if immersed.flow is not None:
             background = Background(self.grid, immersed.flow, flow_parts(self.case), threads)
@@ -85,15 +78,33 @@ class NavierStokesModel(GridModel):
         from ...fluids.shells.stokes import ImmersedBodies
 
         assert isinstance(immersed, ImmersedBodies)
-        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background)
+        swimmers = self.swimmers(rods, method)
+        return NavierStokesWithBodies(immersed, self.density, operator, workspace, background, swimmers=swimmers)
+
+    def operators(
+        self, rods: RodStack, immersed: Immersed, method: str, solver: Callable[[float], Solver]
+    ) -> Callable[[float], Tabulated]:
+        """The maker of answers to forces by ``method``, from an alpha; ``solver`` makes the transforms of one."""
+        from ...fluids import stokes
+
+        factor_cost = self.factor_cost(rods)
+
+        def operator(alpha: float) -> Tabulated:
+            if method == "table":
+                return stokes.StokesByTable(immersed, alpha)
+            if method == "krylov":
+                return stokes.StokesByKrylov(immersed, solver(alpha), factor_cost, alpha)
+            return stokes.StokesByFFT(immersed, solver(alpha), alpha)
+
+        return operator
 
     def output(self, rods: RodStack, fluid: Fluid) -> FluidOutput:
         """Of the velocity that the fluid has."""
         from ...fluids.inertial_fields import InertialFields
-        from ...fluids.navier_stokes import NavierStokes
+        from ...fluids.navier_stokes import InertialFluid
         from ...fluids.output import GridOutput
 
-        assert isinstance(fluid, NavierStokes)
+        assert isinstance(fluid, InertialFluid)
         return GridOutput(self.ingredients(rods, fluid), InertialFields(fluid, self.flow, self.case.compute.threads))
 
     def transforms(self, rods: RodStack) -> bool:
@@ -137,10 +148,11 @@ class NavierStokesModel(GridModel):
     def remarks(self) -> list[str]:
         """A background flow that is put on the grid at each step."""
         if self.flow is None or flow_parts(self.case):
-            return []
+            return super().remarks()
         return [
+            *super().remarks(),
             "fluid.flow is no sum of at most 4 products f(t) g(x, y, z) that is seen: it is put on the grid each step, "
-            "which takes as long as the step itself or twice that"
+            "which takes as long as the step itself or twice that",
         ]
 
     def step_lines(self) -> list[str]:

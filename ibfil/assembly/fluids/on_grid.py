@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from .base import Scene
 
 
+SHARED = 2**21  # cells from which a grid is worth sharing between processes
+
+
 class GridModel(ImmersedModel):
     """A fluid on a periodic grid."""
 
@@ -68,15 +71,23 @@ class GridModel(ImmersedModel):
         """Extents, in cells, of the box that holds the filaments' stencils at the start."""
         from ...grid.pruned_fft import bounding_box
 
-        base, _ = self.space.stencil(self.kernel, rods.start.r)
+        base, _ = self.space.stencil(self.kernel, self.reached(rods))
         return bounding_box(base, self.kernel.points, self.grid.cells)[1]
 
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         if rods.bodies:
-            return self.by_table(rods, inertia=costs.of_inertia(self.grid.cells.tolist(), self.components))
+            return self._of_bodies(rods)
         counts = rods.group_sizes
         return costs.seconds_a_step(self.case, counts, self.grid.cells.tolist(), self._sizes(rods), self.components)
+
+    def _of_bodies(self, rods: RodStack) -> dict[str, float]:
+        """The same with bodies."""
+        cells, points = self.grid.cells.tolist(), rods.count + sum(self.markers)
+        by = {"fft": (self.components - 2) * costs.full_evaluation(cells) + points * costs.SPREAD}
+        if self.components == 3 and not self.case.fluid.inertial:
+            by["pruned"] = costs.pruned_evaluation(cells, self._sizes(rods)) + points * costs.SPREAD
+        return self.with_markers(rods, by, inertia=costs.of_inertia(cells, self.components))
 
     def evaluation(self, rods: RodStack) -> float:
         """By whole FFTs, or those of the filaments' box."""
@@ -144,6 +155,14 @@ class GridModel(ImmersedModel):
         if axis is not None:
             return [*out, *grid_warnings.of_flow(self.grid, self.flow, axis), *sheet.of_flow(self.flow, axis, self.box)]
         return [*out, *grid_warnings.of_flow(self.grid, self.flow)]
+
+    def remarks(self) -> list[str]:
+        """Of a large grid, that processes may share it."""
+        if np.prod(self.grid.cells) < SHARED or self.case.bodies or self.case.thermal is not None:
+            return []
+        how = "" if self.case.fluid.inertial else ' with fluid.method = "fft" or "krylov"'
+        rest = "rods, the mobility table and outputs stay with process 0, as does the file"
+        return [f"mpiexec -n P ibfil run shares the grid, its transforms and fields{how}; {rest}"]
 
     # -- pictures and recorded runs
 

@@ -25,7 +25,8 @@ class StokesModel(GridModel):
         from ...fluids import stokes
 
         if rods.bodies:
-            return self.with_bodies(rods)
+            solver = None if method == "table" else self.solver(rods, method)
+            return self.with_bodies(rods, immersed, method, solver)
         if method == "table":
             return stokes.StokesByTable(immersed)
         solver = self.solver(rods, method)

@@ -107,7 +107,7 @@ class WallModel(FreeModel):
         """Cells of the transforms at the start, down to the wall or to the lowest image."""
         from ...grid.free_fft import padded
 
-        base, _ = self.space.stencil(self.kernel, rods.start.r)
+        base, _ = self.space.stencil(self.kernel, self.reached(rods))
         extents = np.ptp(base, axis=0) + self.kernel.points
         extents[2] = (1 if self.case.fluid.sticks else 2) * (base[:, 2].max() + self.kernel.points)
         return [padded(int(n)) for n in extents]
@@ -115,7 +115,7 @@ class WallModel(FreeModel):
     def seconds(self, rods: RodStack) -> dict[str, float]:
         """Of a step by each method."""
         if rods.bodies:
-            return self.by_table(rods, _IMAGES)
+            return self.with_markers(rods, {"fft": self.evaluation(rods)}, _IMAGES)
         counts = [where.stop - where.start for where in rods.nodes]
         return costs.without_box(self.case, counts, self.components, self.evaluation(rods), _IMAGES)
 

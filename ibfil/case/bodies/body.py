@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field
 
 from ..table import ZERO, Table
 from ..values import Listed, Sizes, TripleT, Vector, by_kind, tagged
-from .shapes import Ellipsoid, Joint, Sphere
+from .shapes import Cloud, Ellipsoid, Joint, Sphere
 
 STILL = (ZERO, ZERO, ZERO)
 
@@ -33,13 +33,17 @@ class Body(Table):
     shape: Annotated[
         Annotated[Sphere, tagged("sphere")]
         | Annotated[Ellipsoid, tagged("ellipsoid")]
+        | Annotated[Cloud, tagged("file")]
         | Annotated[Joint, tagged("joint")],
-        by_kind("sphere", "sphere", "ellipsoid", "joint"),
+        by_kind("sphere", "sphere", "ellipsoid", "file", "joint"),
     ] = Field(description="its shape", examples=[{"kind": "sphere", "radius": 0.1}])
-    resistance: Resistance | None = Field(None, description="rft: its own, instead of that of its shape")
+    resistance: Resistance | None = Field(
+        None, description="rft: its own, instead of that of its shape; a file of markers needs it"
+    )
     position: Vector | None = Field(
         None,
-        description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod",
+        description="of its centre at t = 0; absent: the first end attached to it lies on its surface, along the rod; "
+        "of a file of markers: the origin; a copy of it goes with the copy of its filament",
     )
     axes: Annotated[tuple[Vector, Vector], Listed(2)] = Field(
         ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), description="its first two axes at t = 0, in the lab"

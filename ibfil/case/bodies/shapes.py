@@ -10,7 +10,21 @@ from ..table import Table
 from ..values import Positive, Sizes
 
 
-class Sphere(Table):
+class Shape(Table):
+    """A shape of a body: its three semi-axes, zero where it has none, or the file of its markers."""
+
+    @property
+    def file(self) -> str | None:
+        """None: its markers are made."""
+        return None
+
+    @property
+    def semi_axes(self) -> tuple[float, float, float]:
+        """None."""
+        return 0.0, 0.0, 0.0
+
+
+class Sphere(Shape):
     """A sphere."""
 
     kind: Literal["sphere"] = Field(
@@ -24,7 +38,7 @@ class Sphere(Table):
         return self.radius, self.radius, self.radius
 
 
-class Ellipsoid(Table):
+class Ellipsoid(Shape):
     """An ellipsoid."""
 
     kind: Literal["ellipsoid"] = Field("ellipsoid", description="an ellipsoid, with the drags of its three semi-axes")
@@ -36,12 +50,21 @@ class Ellipsoid(Table):
         return self.axes
 
 
-class Joint(Table):
+class Joint(Shape):
     """A point without size or drag in which rods meet."""
 
     kind: Literal["joint"] = Field("joint", description="a point without size or drag, in which rods meet")
 
+
+class Cloud(Shape):
+    """Markers from a file."""
+
+    kind: Literal["file"] = Field(
+        "file", description="markers read from a file, in the body's axes and from its centre, as they are"
+    )
+    path: str = Field(description="csv or npy: x, y, z, relative to the case", examples=["markers.csv"])
+
     @property
-    def semi_axes(self) -> tuple[float, float, float]:
-        """None: it has no size."""
-        return 0.0, 0.0, 0.0
+    def file(self) -> str:
+        """Where they are."""
+        return self.path

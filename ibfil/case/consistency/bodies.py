@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from ..bodies.body import Body
 from ..bodies.end import End
@@ -28,6 +29,7 @@ def check_bodies(case: Scene) -> Iterator[Fault]:
     for name, body in case.bodies.items():
         yield from _body(f"body.{name}", body, [end for _, _, end in ends_in(case, name)])
     if case.bodies:
+        yield from _copied(case)
         yield from _scene(case)
 
 
@@ -83,13 +85,13 @@ def _motor(key: str, motor: Motor, end: End, filament: Filament) -> Iterator[Fau
 
 
 def _filament(key: str, filament: Filament) -> Iterator[Fault]:
-    """A filament in a body: not one of copies, and begun by the case itself."""
+    """A filament in a body: begun by the case itself."""
     first, last, reads = filament.start, filament.finish, (f"{key}.start", f"{key}.finish")
     if first.attached and last.attached and first.body == last.body and (first.motor or last.motor):
         found = f"{shown(last.body)}, as the start has, and a motor, which would turn it against itself"
         yield Fault(f"{key}.finish.body", found, "another body, or no motor", reads)
-    if filament.copies is not None:
-        yield Fault(f"{key}.copies", "copies of a filament in a body", "a filament and a body for each", reads)
+    if filament.copies is not None and filament.copies.file is not None:
+        yield Fault(f"{key}.copies.file", "a file for copies of a filament in a body", "count with region or at", reads)
     if isinstance(filament.shape, RunShape):
         found = '"run" for a filament in a body, whose pose it does not tell'
         yield Fault(f"{key}.shape.kind", found, "another kind of shape; a run goes on with ibfil run --resume", reads)
@@ -103,6 +105,8 @@ def _body(key: str, body: Body, ends: list[End]) -> Iterator[Fault]:
         yield Fault(f"{key}.axes", shown(body.axes), "two directions at an angle to each other")
     if body.own_axes and body.force is None and body.torque is None:
         yield Fault(f"{key}.frame", '"body" and neither force nor torque', "only with one of them")
+    if body.shape.file is not None and body.meets_rotation:
+        yield Fault(f"{key}.fit", "a fit of markers of a file, which are as they are", "no fit", (f"{key}.shape",))
     if not isinstance(body.shape, Joint):
         return
     if body.resistance is not None:
@@ -114,6 +118,19 @@ def _body(key: str, body: Body, ends: list[End]) -> Iterator[Fault]:
         yield Fault(f"{key}.torque", "a torque on a joint of hinged ends", "an end in it that is not hinged", (key,))
 
 
+def _copied(case: Scene) -> Iterator[Fault]:
+    """Filaments that bodies join, some of which have copies: all go to the same places."""
+    for body in case.bodies:
+        ends = ends_in(case, body)
+        for (first, one, _), (key, other, _) in pairwise(ends):
+            where, reads = f"{key.rsplit('.', 1)[0]}.copies", (first.rsplit(".", 1)[0], f"{key}.body")
+            if one.copies != other.copies:
+                yield Fault(where, f"other copies than at {first}, in the same body {body}", "the same copies", reads)
+            elif other is not one and other.copies is not None and other.copies.apart is not None:
+                found = f"apart with several filaments in body {body}"
+                yield Fault(f"{where}.apart", found, "one filament in it, or no apart", reads)
+
+
 # --- the scene -------------------------------------------------------------------------------------------------------
 
 
@@ -121,6 +138,12 @@ def _scene(case: Scene) -> Iterator[Fault]:
     """Fluids, schemes and rods that bodies are not modelled with."""
     key = f"body.{next(iter(case.bodies))}"
     yield from _fluid(case, key)
+    for name, body in case.bodies.items():
+        if body.shape.file is not None and body.resistance is None and not case.fluid.on_grid:
+            own, found = f"body.{name}.resistance", f"nothing, of markers of a file in {case.fluid.model}"
+            yield Fault(
+                own, found, "translation and rotation, or a fluid on a grid", ("fluid.model", f"body.{name}.shape")
+            )
     if case.thermal is not None:
         yield Fault(key, "a body with [thermal]", "no bodies with [thermal]", ("thermal",))
     if case.time.scheme != "implicit":
@@ -143,8 +166,6 @@ def _fluid(case: Scene, key: str) -> Iterator[Fault]:
     fluid = case.fluid
     if not fluid.on_grid:
         return
-    if fluid.method not in ("auto", "table"):
-        yield Fault("fluid.method", f"{shown(fluid.method)} in a scene with bodies", '"table" or "auto"', (key,))
     if fluid.single:
         yield Fault("fluid.precision", f"{shown(fluid.precision)} in a scene with bodies", '"double"', (key,))
     if fluid.thin_axis is not None:

@@ -24,6 +24,8 @@ def bodies_leaving(filament: Filament, normal: Vector, case: Scene) -> list[str]
 def _leaving(key: str, body: Body, filament: Filament, normal: Vector) -> Iterator[str]:
     if body.position is not None and along(minus(body.position, filament.position), normal, filament):
         yield f"{key}.position"
+    if body.shape.file is not None:  # nothing tells whether its markers are even about the plane
+        yield f"{key}.shape"
     first, second = body.axes
     if len(set(body.shape.semi_axes)) > 1 and not any(
         parallel(axis, normal) for axis in (first, cross(first, second), cross(cross(first, second), first))

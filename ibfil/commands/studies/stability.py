@@ -25,7 +25,7 @@ def do(arguments: argparse.Namespace) -> int:
 
     with opened(arguments.executor, arguments.jobs) as pool:
         result = study.stability(case, varied, folder, changes, jobs=arguments.jobs, executor=pool, log=tell)
-    print_table(study.rows(result), ("message",))
+    print_table(study.rows(result), ("message", "predicted from"))
     tell(
         "against a finer run, the largest over outputs: place and shape (without rigid motion), rms of nodes/L; "
         "turn, rad; stretch; force, ratio"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,11 @@ from ..base import Response
 from ..coupling import Nodes
 from ..history import weights
 from ..navier_stokes import Asked, NavierStokes
-from ..stokes import Tabulated
+from ..stokes import StokesByFFT, Tabulated
+from .interplay import ByTransforms, Means
 from .response import Rigid, WithShells
 from .stokes import ImmersedBodies
+from .swimmer import Swimmer
 
 MARKERS = "markers"  # of the forces of markers in a checkpoint
 
@@ -41,16 +42,26 @@ class NavierStokesWithBodies(NavierStokes):
     immersed: ImmersedBodies
     _markers: np.ndarray | None = None  # their forces (k, 3) in the last step
 
-    def __init__(self, immersed: ImmersedBodies, density: float, operator: Callable[[float], Tabulated], *parts: Any):
-        """Made of the same parts as that of rods alone."""
+    def __init__(
+        self,
+        immersed: ImmersedBodies,
+        density: float,
+        operator: Callable[[float], Tabulated],
+        *parts: Any,
+        swimmers: tuple[Swimmer, ...],
+    ):
+        """Made of the same parts as that of rods alone, and the swimmers that FFTs are preconditioned by."""
         super().__init__(immersed, density, operator, *parts)
+        self.swimmers = swimmers
 
-    def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> WithShells:
+    def response(
+        self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0
+    ) -> WithShells | ByTransforms:
         """The mobility of rods and bodies, and the velocity with which the fluid coasts into the step."""
         immersed, n = self.immersed, self.immersed.shells.nodes
         alpha, operator = self._operator(self.density / tau)
         nodes, past = immersed.all_nodes(r, e3), weights(alpha, tau, w, self.history.dt_old)
-        felt = self.workspace.gather(nodes, partial(self.history.predict, past))
+        felt = self._coast(nodes, past)
         u0, c = immersed.coupling.from_grid(nodes.axes, felt), immersed.coupling.components
         flow, drift = immersed.advected(nodes[:n], r[:n], time), u0[n:, :3]
         rods = u0[:n]
@@ -58,15 +69,20 @@ class NavierStokesWithBodies(NavierStokes):
             assert immersed.flow is not None
             rods = np.column_stack([rods + flow[:, :c], flow[:, c:]])
             drift = drift + immersed.flow(immersed.shells.places(r, e3), time)
-        levers = immersed.shells.levers(e3, immersed.shells.unknowns(len(r)))
-        rigid = Rigid(operator.matrix(nodes, immersed.own), c * n, c, levers, drift.ravel())
-        response = WithShells(rigid, immersed.shells, rods, immersed.spin_drag, tau)
+        response: WithShells | ByTransforms
+        if isinstance(operator, StokesByFFT):
+            means = Means(operator.solver, operator.matrix, self.swimmers)
+            response = ByTransforms(immersed, means, nodes, e3, immersed.both(rods, drift), tau)
+        else:
+            levers = immersed.shells.levers(e3, immersed.shells.unknowns(len(r)))
+            rigid = Rigid(operator.matrix(nodes, immersed.own), c * n, c, levers, drift.ravel())
+            response = WithShells(rigid, immersed.shells, rods, immersed.spin_drag, tau)
         self._asked = Asked(response, nodes, past)
         return response
 
     def advance(self, response: Response, velocity: np.ndarray, force: np.ndarray) -> None:
         """The same, markers pushing as the step found."""
-        assert isinstance(response, WithShells)
+        assert isinstance(response, WithShells | ByTransforms)
         self._markers = response.marker_forces()
         super().advance(response, velocity, self.immersed.joined(force, self._markers))
 
@@ -75,7 +91,7 @@ class NavierStokesWithBodies(NavierStokes):
         if self._markers is not None:
             return self._markers
         assert self._asked is not None
-        assert isinstance(self._asked.response, WithShells)
+        assert isinstance(self._asked.response, WithShells | ByTransforms)
         return self._asked.response.marker_forces()
 
     @property

@@ -16,8 +16,11 @@ bodies/border.py, with own = B^T F_m. M_mm is positive definite, and taken out o
 
 from __future__ import annotations
 
+from copy import copy
+from typing import NamedTuple
+
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.lapack import dpotrf, dtrtrs
 
 from ...bodies.border import Done, Own, bordered, frozen, supported
 from ...errors import StepFailed
@@ -27,6 +30,8 @@ from ...linalg.normal_numbers import Draw
 from ...linalg.stiffness import Stiffness, no_pairs
 from ..base import Solution
 from .shell import Shells
+
+FEW = 300  # unknowns of nodes, whose matrix is factored again in less time than an iteration with an old one takes
 
 
 class MarkersTooClose(StepFailed):
@@ -43,35 +48,42 @@ class Rigid:
 
         ``levers`` (3 k, p) and ``drift`` (3 k,), in a background flow, are of the markers.
         """
-        self.whole = matrix
+        self.whole, self.components = matrix, components
         at: slice | np.ndarray = slice(rods, None)
         if components > 3:  # markers do not spin
             at = np.arange(rods, len(matrix)).reshape(-1, components)[:, :3].ravel()
-        shell, across = matrix[at][:, at], matrix[at, :rods]
-        try:
-            self._lower = cholesky(shell, lower=True, check_finite=False)
-        except np.linalg.LinAlgError:
-            raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0) from None
-        drifting = np.zeros((len(levers), 1)) if drift is None else drift[:, None]
-        half = self._solved(np.concatenate([across, levers, drifting], axis=1))
-        self._half, own, drifted = half[:, :rods], half[:, rods:-1], half[:, -1]
-        self._own = half[:, rods:]
+        self._lower, fault = dpotrf(matrix[at][:, at].T, lower=1, clean=0)  # symmetric: LAPACK takes rows for columns
+        if fault:
+            raise MarkersTooClose("markers of bodies are too close: their mobility has no inverse", 0)
+        right = np.empty((rods + levers.shape[1] + 1, len(levers)))
+        right[:rods], right[rods:-1], right[-1] = matrix[:rods, at], levers.T, 0.0 if drift is None else drift
+        half = self._solved(right.T)
+        self._half, self._own = half[:, :rods], half[:, rods:-1]
         self.rods = matrix[:rods, :rods] - self._half.T @ self._half
-        self.by_bodies = self._half.T @ own  # how rods move with q: T^T B
+        self.by_bodies = self._half.T @ self._own  # how rods move with q: T^T B
+        self.resistance = self._own.T @ self._own  # of the bodies where rods do not push (p, p)
+        self._drift(half[:, -1])
+
+    def _drift(self, drifted: np.ndarray) -> None:
+        """Takes L^-1 (3 k,) of the motions that markers have without any force."""
+        self._drifted = drifted
         self.carried = -(self._half.T @ drifted)
-        self.resistance = own.T @ own  # of the bodies where rods do not push (p, p)
-        self._drifting = own.T @ drifted
+        self._drifting = self._own.T @ drifted
+
+    def drifting(self, drift: np.ndarray) -> Rigid:
+        """The same where markers drift so (3 k,)."""
+        out = copy(self)
+        out._drift(self._solved(drift.copy()))
+        return out
 
     def _solved(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """L^-1 right, or L^-T, of M_mm = L L^T."""
-        out: np.ndarray = solve_triangular(
-            self._lower, right, trans=int(transposed), lower=True, overwrite_b=True, check_finite=False
-        )
+        out: np.ndarray = dtrtrs(self._lower, right, lower=1, trans=int(transposed), overwrite_b=1)[0]
         return out
 
     def pushes(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
         """The forces of markers on the fluid (3 k,) when q has rates (p,) and rods push with ``felt`` (c n,)."""
-        return self._solved(self._own @ np.append(rate, -1.0) - self._half @ felt, transposed=True)
+        return self._solved(self._own @ rate - self._drifted - self._half @ felt, transposed=True)
 
     def forces(self, rate: np.ndarray, felt: np.ndarray) -> np.ndarray:
         """B^T F_m: forces and torques of the bodies on the fluid (p,)."""
@@ -85,23 +97,42 @@ class Rigid:
         return out
 
 
+class _Nodes(NamedTuple):
+    """Corrections of nodes, and what the fluid feels and supports bear: (k, n, m) each, k of them."""
+
+    moves: np.ndarray
+    felt: np.ndarray
+    reactions: np.ndarray
+
+
+class _Each(NamedTuple):
+    """The corrections (p) by each unknown of bodies, and what they are of."""
+
+    of: tuple[Stiffness, np.ndarray, np.ndarray]
+    nodes: _Nodes
+
+    def serves(self, stiffness: Stiffness, carried: Carried) -> bool:
+        """Whether they are those of this linear step."""
+        return all(a is b for a, b in zip(self.of, (stiffness, carried.lever, carried.columns), strict=True))
+
+
 class WithShells:
     """The response of rods and bodies, positions frozen over a step of effective length tau.
 
     Dense: all m unknowns of a node in one system, turns that do not go through the fluid by their own drag (n,).
     """
 
-    keeps = True
-
     def __init__(
         self, rigid: Rigid, shells: Shells, flow: np.ndarray | None, spin_drag: np.ndarray | None, tau: float
     ) -> None:
         """``flow`` (n, c) or (n, m): the motions of nodes without any force."""
         self._rigid, self._shells, self._flow, self.tau = rigid, shells, flow, tau
-        self._c = len(rigid.rods) // shells.nodes
+        self._c = rigid.components
         self._mobility = rigid.rods if spin_drag is None else _with_turns(rigid.rods, spin_drag)
+        self.keeps = len(self._mobility) > FEW
         self._factors: tuple[Stiffness, Factors] | None = None  # and the stiffness they are of
-        self._last: tuple[np.ndarray, np.ndarray] | None = None  # rates of q, and what nodes do
+        self._each: _Each | None = None
+        self._last: tuple[Rigid, np.ndarray, np.ndarray] | None = None  # rates of q, and what nodes do
 
     def fluctuation(self, draw: Draw, shape: tuple[int, int]) -> np.ndarray:
         """Not of scenes with bodies, which have no thermal forces."""
@@ -115,32 +146,27 @@ class WithShells:
         y: np.ndarray,
         target: np.ndarray,
         error: float = 0.0,
+        coming: np.ndarray | None = None,
     ) -> Solution:
-        """One correction of nodes and bodies: of nodes while bodies stay, and by each unknown of these, in one."""
+        """One correction of nodes and bodies: of nodes while bodies stay, and by each unknown of these.
+
+        ``coming`` (n + k, c) or (n + k, m): how nodes and markers move over the step by what is not here, in place of
+        the flow and the drift.
+        """
         carried = held.carried
         assert carried is not None
         n, m = self._shells.nodes, force.shape[1]
-        moved = self._shells.of_rows(y - target)
+        moved, flow, rigid = self._shells.of_rows(y - target), self._flow, self._rigid
+        if coming is not None:
+            flow, rigid = coming[:n] / self.tau, self._rigid.drifting(coming[n:, :3].ravel() / self.tau)
         at, value = _inside(held, carried, y, n * m)
-        known = np.zeros((1 + len(carried.by), n * m))
-        known[:, at] = value
-        pushes = np.concatenate([force[None, :n], carried.columns.transpose(2, 0, 1)]).reshape(len(known), -1)
-        base = np.concatenate([(self._base(target[:n], moved) - y[:n])[None], self._by_bodies(m)]).reshape(known.shape)
-        pushed = pushes + _times(stiffness, known, m)
-        x = self._solve(stiffness, at, (base - known + self.tau * pushed @ self._mobility).T).T
-        d, reaction = x.copy(), np.zeros_like(x)
-        d[:, at], reaction[:, at] = value, x[:, at]
-        felt = pushes + _times(stiffness, d, m) + reaction
-        d, felt, reaction = (part.reshape(-1, n, m) for part in (d, felt, reaction))
-        return self._whole(held, carried, Solution(d, felt, reaction), y, moved)
+        base = self._base(rigid, target[:n], flow, moved) - y[:n]
+        parts = self._first_and_each(stiffness, (at, value), (force[:n], base), carried)
+        return self._whole(held, (rigid, *parts), y, moved)
 
     def forced(self, force: np.ndarray, held: Prescribed, target: np.ndarray) -> Solution:
         """The displacements without stiffness: by that of none."""
-        n, m = self._shells.nodes, force.shape[1]
-        none = Stiffness(np.zeros((n, m, 3 * m)), no_pairs(m))
-        assert held.carried is not None
-        bare = held._replace(carried=frozen(held.carried))
-        return self.implicit(force, none, bare, np.zeros_like(force), target)
+        return self.implicit(*without_stiffness(force, held, self._shells.nodes), np.zeros_like(force), target)
 
     def apply(self, force: np.ndarray) -> np.ndarray:
         """Velocities of forces on rods and markers, c numbers of each (flat), without the background flow."""
@@ -149,10 +175,53 @@ class WithShells:
     def marker_forces(self) -> np.ndarray:
         """The forces of markers on the fluid (k, 3), by the last correction."""
         assert self._last is not None
-        return self._rigid.pushes(*self._last).reshape(-1, 3)
+        rigid, rate, felt = self._last
+        return rigid.pushes(rate, felt).reshape(-1, 3)
+
+    def _first_and_each(
+        self,
+        stiffness: Stiffness,
+        moves: tuple[np.ndarray, np.ndarray],
+        pushed: tuple[np.ndarray, np.ndarray],
+        carried: Carried,
+    ) -> tuple[_Nodes, _Nodes]:
+        """The corrections while bodies stay, and by each of their unknowns, as before in the same linear step.
+
+        ``moves``: the unknowns (l,) that are held or carried, and how far these are off; ``pushed``: forces on nodes
+        and their moves without any (n, m).
+        """
+        (at, value), (n, m, p) = moves, carried.columns.shape
+        again = self._each is not None and self._each.serves(stiffness, carried)
+        known = np.zeros((1 if again else 1 + p, n * m))
+        known[0, at] = value
+        if self._each is not None and again:
+            return self._corrections(stiffness, at, known, *(part[None] for part in pushed)), self._each.nodes
+        known[1:, at[len(at) - len(carried.at) :]] = carried.lever.T
+        forces, base = np.empty((1 + p, n, m)), np.zeros((1 + p, n, m))
+        forces[0], base[0] = pushed
+        forces[1:] = carried.columns.transpose(2, 0, 1)
+        base[1:, :, : self._c] = self._rigid.by_bodies.T.reshape(p, n, self._c)
+        found = self._corrections(stiffness, at, known, forces, base)
+        first, each = _Nodes(*(part[:1] for part in found)), _Nodes(*(part[1:] for part in found))
+        self._each = _Each((stiffness, carried.lever, carried.columns), each)
+        return first, each
+
+    def _corrections(
+        self, stiffness: Stiffness, at: np.ndarray, known: np.ndarray, pushes: np.ndarray, base: np.ndarray
+    ) -> _Nodes:
+        """Corrections where ``known`` (k, n m) move unknowns ``at``, by forces and displacements (k, n, m)."""
+        k, n, m = pushes.shape
+        pushed = pushes.reshape(k, -1) + _times(stiffness, known, m)
+        x = self._solve(stiffness, at, (base.reshape(k, -1) - known + self.tau * pushed @ self._mobility).T).T
+        d, reaction = x.copy(), np.zeros_like(x)
+        d[:, at], reaction[:, at] = known[:, at], x[:, at]
+        felt = pushes.reshape(k, -1) + _times(stiffness, d, m) + reaction
+        return _Nodes(*(part.reshape(k, n, m) for part in (d, felt, reaction)))
 
     def _solve(self, stiffness: Stiffness, at: np.ndarray, right: np.ndarray) -> np.ndarray:
         """x of (1 - tau M K) x = right (m n, k), columns of -tau M where unknowns are held: there forces are sought."""
+        if not right.size:
+            return right
         if self._factors is None or self._factors[0] is not stiffness:
             size = len(self._mobility)
             system = stiffness.transposed_product(self._mobility, -self.tau).reshape(size, size)
@@ -161,53 +230,56 @@ class WithShells:
             self._factors = stiffness, factor(system)
         return self._factors[1].solve(right)
 
-    def _base(self, target: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    def _base(self, rigid: Rigid, target: np.ndarray, flow: np.ndarray | None, moved: np.ndarray) -> np.ndarray:
         """The displacements (n, m) of rods without any force, bodies having moved by ``moved`` (p,)."""
         out, c = target.copy(), self._c
-        out[:, :c] += (self._rigid.by_bodies @ moved + self.tau * self._rigid.carried).reshape(-1, c)
-        if self._flow is not None:
-            out[:, : self._flow.shape[1]] += self.tau * self._flow
+        out[:, :c] += (rigid.by_bodies @ moved + self.tau * rigid.carried).reshape(-1, c)
+        if flow is not None:
+            out[:, : flow.shape[1]] += self.tau * flow
         return out
 
-    def _by_bodies(self, m: int) -> np.ndarray:
-        """The displacements (p, n, m) of rods as each unknown of the bodies moves by one."""
-        n, p = self._shells.nodes, self._rigid.by_bodies.shape[1]
-        out = np.zeros((p, n, m))
-        out[:, :, : self._c] = self._rigid.by_bodies.T.reshape(p, n, self._c)
-        return out
-
-    def _whole(self, held: Prescribed, carried: Carried, nodes: Solution, y: np.ndarray, moved: np.ndarray) -> Solution:
-        """The correction of rods and bodies, from that of rods while bodies stay and by each unknown (1 + p, n, m)."""
-        c, rigid, tau = self._c, self._rigid, self.tau
-        felt = nodes.force[:, :, :c].reshape(len(nodes.force), -1)
-        own = Own(rigid.forces(moved / tau, felt[0]), rigid.resistance / tau - rigid.by_bodies.T @ felt[1:].T)
-        first, each, supports = Done(nodes.move[0], nodes.force[0]), Done(nodes.move[1:], nodes.force[1:]), None
+    def _whole(
+        self, held: Prescribed, parts: tuple[Rigid, _Nodes, _Nodes], y: np.ndarray, moved: np.ndarray
+    ) -> Solution:
+        """The correction of rods and bodies, from that of rods while bodies stay and by each unknown."""
+        (rigid, one, each), c, tau, carried = parts, self._c, self.tau, held.carried
+        assert carried is not None
+        p = len(carried.by)
+        pushed = each.felt[:, :, :c].reshape(p, -1)
+        own = Own(
+            rigid.forces(moved / tau, one.felt[0, :, :c].ravel()), rigid.resistance / tau - rigid.by_bodies.T @ pushed.T
+        )
+        first, by, supports = Done(one.moves[0], one.felt[0]), Done(each.moves, each.felt), None
         if carried.clamps is not None:
-            there = nodes.reaction[:, carried.clamps.nodes]
-            supports = supported(carried.clamps, there[0], there[1:], first, each)
-        dq, reacted = bordered(held, carried, (first, each, own, supports), y, moved / tau, tau)
-        weights = np.append(1.0, dq)
-        d, force, support = ((weights @ part.reshape(len(part), -1)).reshape(part.shape[1:]) for part in nodes[:3])
-        self._last = (moved + dq) / tau, force[:, :c].ravel()
-        done = rigid.forces(*self._last)
-        rows = (self._shells.in_rows(q, y.shape) for q in (dq, done, reacted))
+            at = carried.clamps.nodes
+            supports = supported(carried.clamps, one.reactions[0, at], each.reactions[:, at], first, by)
+        dq, reacted = bordered(held, carried, (first, by, own, supports), y, moved / tau, tau)
+        d, force, support = (a[0] + (dq @ b.reshape(p, -1)).reshape(a[0].shape) for a, b in zip(one, each, strict=True))
+        rate, felt = (moved + dq) / tau, force[:, :c].ravel()
+        self._last = rigid, rate, felt
+        rows = (self._shells.in_rows(q, y.shape) for q in (dq, rigid.forces(rate, felt), reacted))
         move, felt, reaction = (np.concatenate(both) for both in zip((d, force, support), rows, strict=True))
         return Solution(move, felt, reaction)
 
 
+def without_stiffness(force: np.ndarray, held: Prescribed, n: int) -> tuple[np.ndarray, Stiffness, Prescribed]:
+    """The force, a stiffness of zeros of n nodes, and what is held and carried where forces stay as they are."""
+    m = force.shape[1]
+    assert held.carried is not None
+    return force, Stiffness(np.zeros((n, m, 3 * m)), no_pairs(m)), held._replace(carried=frozen(held.carried))
+
+
 def _inside(held: Prescribed, carried: Carried, y: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The held and the carried among the first unknowns, and their moves (1 + p, k): now, by each of q."""
+    """The held and then the carried among the first unknowns (k,), and their moves (k,) while bodies stay."""
     inside = held.at < count
-    still, flat = held.at[inside], y.ravel()
-    value = np.zeros((1 + len(carried.by), len(still) + len(carried.at)))
-    value[0] = np.concatenate([held.value[inside] - flat[still], carried.value])
-    value[1:, len(still) :] = carried.lever.T
+    still = held.at[inside]
+    value = np.concatenate([held.value[inside] - y.ravel()[still], carried.value])
     return np.concatenate([still, carried.at]), value
 
 
 def _times(stiffness: Stiffness, x: np.ndarray, m: int) -> np.ndarray:
     """K times each of x (k, m n)."""
-    return np.array([stiffness.times(one.reshape(-1, m)).ravel() for one in x])
+    return stiffness.times_each(x.reshape(len(x), -1, m)).reshape(x.shape)
 
 
 def _with_turns(mobility: np.ndarray, spin_drag: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ...rods.linearization import cross
+
 
 @dataclass(frozen=True)
 class Shells:
@@ -58,7 +60,7 @@ class Shells:
     def _arms(self, e3: np.ndarray) -> list[np.ndarray]:
         """The markers from their body's centre, (k, 3) a body, in the lab."""
         third, first = e3[self.nodes : self.end : 2], e3[self.nodes + 1 : self.end : 2]
-        axes = np.stack([first, np.cross(third, first), third], axis=1)
+        axes = np.stack([first, cross(third, first), third], axis=1)
         return [points @ turned for points, turned in zip(self.markers, axes, strict=True)]
 
     def in_rows(self, q: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -63,16 +63,17 @@ class ImmersedBodies(Immersed):
         n, places = self.shells.nodes, self.shells.places(r, e3)
         rods = self.advected(self.all_nodes(r, e3)[:n], r[:n], time)
         assert rods is not None
-        markers = np.zeros((len(places), rods.shape[1]))
-        markers[:, :3] = self.flow(places, time)
-        return np.concatenate([rods, markers])
+        return self.both(rods, self.flow(places, time))
+
+    def both(self, rods: np.ndarray, markers: np.ndarray) -> np.ndarray:
+        """Motions (n + k, c) of nodes (n, c) and markers (k, 3), which do not spin."""
+        out = np.zeros((len(rods) + len(markers), rods.shape[1]))
+        out[: len(rods)], out[len(rods) :, :3] = rods, markers
+        return out
 
     def joined(self, force: np.ndarray, markers: np.ndarray) -> np.ndarray:
         """The forces (n + k, m) of nodes, from those of all rows (N, m), and of markers (k, 3)."""
-        n = self.shells.nodes
-        out = np.zeros((n + len(markers), force.shape[1]))
-        out[:n], out[n:, :3] = force[:n], markers
-        return out
+        return self.both(force[: self.shells.nodes], markers)
 
 
 class BodyInWall(StepFailed):
@@ -103,12 +104,18 @@ class StokesWithBodies(Memoryless):
 
     def response(self, r: np.ndarray, e3: np.ndarray, time: float, tau: float, w: float = 0.0) -> WithShells:
         """The mobility of rods and bodies at r, e3 (N, 3), in the background flow of ``time``."""
+        self.refuse(r, e3)
         immersed, n = self.immersed, self.immersed.shells.nodes
-        height = float(np.min(immersed.shells.places(r, e3)[:, 2], initial=np.inf))
-        if height < self.lowest:
-            raise BodyInWall(f"a body went into the wall: a marker at z = {height:.3g}, allowed {self.lowest:.3g}", 0)
         nodes, p = immersed.all_nodes(r, e3), immersed.shells.unknowns(len(r))
         rods = nodes[:n]
         flow = immersed.advected(rods, r[:n], time)
         rigid = immersed.rigid(nodes, r, e3, time, p)
         return WithShells(rigid, immersed.shells, flow, immersed.spin_drag, tau)
+
+    def refuse(self, r: np.ndarray, e3: np.ndarray) -> None:
+        """Raises BodyInWall where a marker is too low."""
+        if not np.isfinite(self.lowest):
+            return
+        height = float(np.min(self.immersed.shells.places(r, e3)[:, 2], initial=np.inf))
+        if height < self.lowest:
+            raise BodyInWall(f"a body went into the wall: a marker at z = {height:.3g}, allowed {self.lowest:.3g}", 0)

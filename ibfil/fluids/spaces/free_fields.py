@@ -12,13 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from scipy import fft
 
 from ...grid.far_pairs import far_pair, moments
 from ...grid.free_space import ODD, PAIRS, PARTS, REACH, response
 from ...grid.periodic_grid import Lattice
 from ...grid.spreading import spread
+from ...linalg.compiled import njit
 from ..base import Flow
 from ..velocity_gradient import curl
 

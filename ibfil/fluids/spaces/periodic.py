@@ -55,21 +55,25 @@ class PeriodicSpace:
     def mobility(
         self, coupling: Coupling, points: int, viscosity: float, alpha: float = 0.0, number: type = np.float64
     ) -> TableMobility:
-        """By the grid's response to one cell, whose octant is kept in the user's cache where it is large."""
+        """By the grid's response to one cell, whose octant is kept in the user's cache where it is large.
 
-        def made(viscosity: float) -> np.ndarray:
-            return mobility_table.octant(coupling.response(self.grid, viscosity, alpha), points, number).values
+        In Stokes flow it is that of viscosity 1, divided by the viscosity: one table for all of them.
+        """
 
-        if self._kept(alpha):  # that of unit viscosity, which serves all
-            values = _at_hand(self._key(coupling, points, number), lambda: made(1.0))
-            values = values if viscosity == 1.0 else values / number(viscosity)
-        else:
+        def made(eta: float) -> np.ndarray:
+            return mobility_table.octant(coupling.response(self.grid, eta, alpha), points, number).values
+
+        if alpha:
             values = made(viscosity)
+        else:
+            key = self._key(coupling, points, number)
+            unit = _at_hand(key, lambda: made(1.0)) if self._kept() else made(1.0)
+            values = unit if viscosity == 1.0 else unit / number(viscosity)
         return TableMobility(coupling, mobility_table.Octant(values, np.array(self.cells, np.int64)))
 
-    def _kept(self, alpha: float) -> bool:
+    def _kept(self) -> bool:
         """Whether it is worth it. With inertia each length of a step has a table: they would drive out all others."""
-        return alpha == 0 and int(np.prod(self.cells)) >= _LARGE and bool(_code())
+        return int(np.prod(self.cells)) >= _LARGE and bool(_code())
 
     def _key(self, coupling: Coupling, points: int, number: type) -> dict[str, object]:
         """All that an octant of unit viscosity depends on."""
@@ -90,10 +94,12 @@ _last: dict[str, np.ndarray] = {}  # the last octant, by its key
 def _at_hand(key: dict[str, object], make: Callable[[], np.ndarray]) -> np.ndarray:
     """The octant of the last run of this process, as runs of a study have the same, or that of the user's cache."""
     text = repr(key)
-    if text not in _last:
+    values = _last.get(text)
+    if values is None:
+        values = cache.table(key, make)
         _last.clear()
-        _last[text] = cache.table(key, make)
-    return _last[text]
+        _last[text] = values
+    return values
 
 
 @once

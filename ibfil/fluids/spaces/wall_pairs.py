@@ -18,11 +18,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ...grid.far_pairs import is_far, moments
 from ...grid.free_space import REACH
 from ...grid.wall_tables import HIGH, image, oseen
+from ...linalg.compiled import njit
 from ...linalg.vectors import NOT_NEGATIVE
 from .. import mobility_table
 from ..mobility_table import Octant, plane_sums

@@ -25,8 +25,8 @@ of blunt cylinders are those of K2 5.45/(2 pi) as large, of an r_e 7 % larger (C
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...linalg.compiled import njit
 from ..base import Flow
 from ..velocity_gradient import gradient
 

@@ -14,8 +14,8 @@ from abc import abstractmethod
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ...linalg.compiled import njit
 from ..geometry import Configuration
 from ..linearization import Linearization
 from ..loads import ExternalLoad

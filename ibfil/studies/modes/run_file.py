@@ -44,7 +44,9 @@ def write(path: Path, scene: SceneAtRest, poses: Iterator[Pose], method: str, re
     for pose in chain([first], poses):
         force, _ = scene.system.forces(pose.configuration, 0.0)
         state = State(pose.time, pose.configuration, np.zeros_like(force), 0.0)
-        snapshot = diagnostics.snapshot(SolvedState(state, pose.velocity, force, np.zeros_like(force), 0, 0))
+        snapshot = diagnostics.snapshot(
+            SolvedState(state, pose.velocity, force, np.zeros_like(force), 0, 0, pose.configuration)
+        )
         values = seen.record(snapshot)
         if recorder is None:
             case = simulation.case

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..settings import Axis, Setting
 
-if TYPE_CHECKING:
-    pass
-
-
+STRETCH, LOCKED, TURN, PLACE = 0.02, 10.0, 0.1, 0.05  # what is amiss: above these
 CLASSES = ("stable", "wrong", "turned", "locked", "stretched", "diverged", "no reference")
 
 
@@ -23,6 +20,7 @@ class MapCell:
     kind: str
     numbers: Mapping[str, float]  # place, shape, turn, stretch, force
     predicted: str
+    why: str  # what that is taken from
     message: str
 
 

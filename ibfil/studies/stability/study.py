@@ -11,8 +11,7 @@ on a grid with a slip of at least 0.01, which keeps rods from locking. The first
     wrong       nodes are more than 0.05 L away (rms)
     stable      none of these
 
-Predictions, made without a run: that an explicit step beyond 2/rho(M K) diverges, that nodes nearer than 0.8 h without
-slip lock, and that omega dt beyond 2 pi/20 is not accurate.
+What is foretold of it without a run is in predictions.py.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ from ..member import Member, Outcome
 from ..members import run_members
 from ..settings import Axis, Setting, combinations
 from ..tables import measured, refuse_strangers, study_members, write_csv, write_json
-from .results import Map, MapCell
+from .predictions import Prediction, Rests, predicted
+from .results import LOCKED, PLACE, STRETCH, TURN, Map, MapCell
 
 if TYPE_CHECKING:
     from ...io.reader import RunFile
 
 
 TABLE, DETAILS, FIGURE = "stability.csv", "stability.json", "stability.png"
-STRETCH, LOCKED, TURN, PLACE = 0.02, 10.0, 0.1, 0.05
 FINER, SLIP = 4, 0.01
 
 Log = Callable[[str], object]
@@ -60,20 +59,20 @@ def stability(
     folder, settings = Path(folder), combinations(axes)
     members = study_members(case, overrides, settings)
     refuse_strangers(folder, DETAILS, TABLE, FIGURE)
-    finer, predictions = [], []
+    finer, predictions, rests = [], [], Rests()
     shared: dict[str, Member] = {}  # by the case: cells that differ in nothing it keeps have one, called as the first
     for member in members:
-        reference, predicted = _prepared(member)
+        reference, foretold = _prepared(member, rests)
         finer.append(None if reference is None else shared.setdefault(reference.resolved().text, reference))
-        predictions.append(predicted)
+        predictions.append(foretold)
     references = list(shared.values())
     run_members(
         references, folder / "finer", jobs=jobs, executor=executor, log=lambda line: log(f"finer run of {line}")
     )
     outcomes = run_members(members, folder / "runs", jobs=jobs, executor=executor, log=log)
     cells = tuple(
-        _cell(setting, outcome, None if best is None else folder / "finer" / f"{best.name}.h5", predicted)
-        for setting, outcome, best, predicted in zip(settings, outcomes, finer, predictions, strict=True)
+        _cell(setting, outcome, None if best is None else folder / "finer" / f"{best.name}.h5", foretold)
+        for setting, outcome, best, foretold in zip(settings, outcomes, finer, predictions, strict=True)
     )
     title = next((_title(member) for member in members if _title(member)), "")
     result = Map(title, tuple(axes), cells, measured())
@@ -88,7 +87,7 @@ def _title(member: Member) -> str:
         return ""
 
 
-def _prepared(member: Member) -> tuple[Member | None, str]:
+def _prepared(member: Member, rests: Rests) -> tuple[Member | None, Prediction]:
     """The finer run of a member and what is predicted of it; no run where its case is at fault."""
     from ...simulation.simulation import Simulation
 
@@ -102,7 +101,7 @@ def _prepared(member: Member) -> tuple[Member | None, str]:
     except CaseError as error:
         if "random runs" in str(error):
             raise
-        return None, ""
+        return None, Prediction()
     explicit = case.time.explicit
     default = ("time.scheme=implicit", "time.order=2")
     if explicit:
@@ -113,38 +112,21 @@ def _prepared(member: Member) -> tuple[Member | None, str]:
     overrides = (*member.overrides, *default, f"time.step={step!r}")
     if case.fluid.on_grid:
         overrides += (f"fluid.slip={max(case.fluid.slip, SLIP)!r}",)
-    return Member(member.name, member.case, overrides), _predicted(simulation)
+    return Member(member.name, member.case, overrides), predicted(simulation, rests)
 
 
-def _predicted(simulation: Any) -> str:
-    """The name of what the dimensionless groups say will happen."""
-    from ...assembly.fluids.grid_warnings import LOCKING_SPACING
-    from ...check.dimensionless import groups
-    from ...simulation.steps import LONG_PHASE
-
-    case = simulation.case
-    if case.time.explicit:
-        return "diverged" if simulation.step_length > simulation.explicit_limit() else ""
-    found = groups(simulation)
-    near = min((value for key, value in found.items() if key.endswith("ds/h")), default=np.inf)
-    if case.fluid.on_grid and case.fluid.slip == 0 and near < LOCKING_SPACING:
-        return "locked"
-    fast = max((value for key, value in found.items() if key.endswith("omega dt")), default=0.0)
-    return "wrong" if fast > LONG_PHASE * (1 + 1e-9) else ""
-
-
-def _cell(setting: Setting, outcome: Outcome, finer: Path | None, predicted: str) -> MapCell:
+def _cell(setting: Setting, outcome: Outcome, finer: Path | None, foretold: Prediction) -> MapCell:
     from ...io.reader import RunFile
 
     if not outcome.done:
-        return MapCell(setting, "diverged", {}, predicted, outcome.message)
+        return MapCell(setting, "diverged", {}, *foretold, outcome.message)
     if finer is None or not finer.exists():
-        return MapCell(setting, "no reference", {}, predicted, "the finer run could not be made")
+        return MapCell(setting, "no reference", {}, *foretold, "the finer run could not be made")
     with RunFile(outcome.path) as run, RunFile(finer) as best:
         if best.status not in ("finished", "stopped"):
-            return MapCell(setting, "no reference", {}, predicted, f"the finer run: {best.reason}")
+            return MapCell(setting, "no reference", {}, *foretold, f"the finer run: {best.reason}")
         found = compared(run, best)
-    return MapCell(setting, classed(found), found, predicted, "")
+    return MapCell(setting, classed(found), found, *foretold, "")
 
 
 def compared(run: RunFile, best: RunFile) -> dict[str, float]:
@@ -190,6 +172,7 @@ def rows(result: Map) -> list[dict[str, Any]]:
             **cell.setting.values,
             "class": cell.kind,
             "predicted": cell.predicted or "stable",
+            "predicted from": cell.why,
             **cell.numbers,
             "message": cell.message,
         }

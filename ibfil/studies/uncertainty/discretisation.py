@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ...errors import CaseError
@@ -18,11 +19,12 @@ if TYPE_CHECKING:
     from .levels import Base
     from .numbers import Numbered
 
+SHELLS = "not looked at, the cells being as they are: `ibfil check` tells how far off the drag of each body is"
 Found = dict[str, Source]  # of one source, by number
 
 
 def refined(study: Runs, base: Base, recorded: Numbered, fine: bool) -> list[Found]:
-    """The errors of step and nodes, and on a grid of the place in a cell."""
+    """The errors of step and nodes, and on a grid of the place in a cell; bodies there have one that is not known."""
     ladder = Ladder(base, recorded, study.make, study.run, study.why)
     in_time = levels.steps(base)
     under = levels.twice_the_step(base) if ladder.climb(in_time, fine) else ()
@@ -32,6 +34,10 @@ def refined(study: Runs, base: Base, recorded: Numbered, fine: bool) -> list[Fou
     found = [ladder.sources(in_time), ladder.sources(in_space)]
     if moved is not None:
         found.append(_place(study, levels.level_member(base, in_space, 0), moved, recorded))
+        if base.case.fluid.wall is not None:
+            found[-1] = {k: replace(one, words=f"{one.words}, along the wall only") for k, one in found[-1].items()}
+        if base.case.bodies:
+            found.append({k: Source("shells of bodies", True, None, SHELLS) for k in recorded.numbers()})
     return found
 
 

@@ -63,7 +63,7 @@ def _tied(case: Case, shift: np.ndarray) -> Iterator[str]:
         if isinstance(link, Spring) and any(site.point is not None for site in link.between):
             yield f"link.{name}.between=[{', '.join(_site(site, shift) for site in link.between)}]"
     for name, body in case.bodies.items():
-        if body.position is not None:
+        if body.position is not None and name in case.each_body:  # copies go with their filaments
             yield f"body.{name}.position={[float(x) for x in np.array(body.position) + shift]}"
     for name, filament in case.filaments.items():
         for side, end in (("start", filament.start), ("finish", filament.finish)):

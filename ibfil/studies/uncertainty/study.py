@@ -31,7 +31,7 @@ from .results import Bar, Source, Uncertainty
 if TYPE_CHECKING:
     from ...case.schema import Case
 
-RUNS = "runs"
+RUNS, BASE = "runs", "base"  # the folder of the runs, and the name of the scene's own
 SINGLE = 1e-8  # of a number: what single precision changes (measured: 7e-9 to 1.6e-8 of speeds)
 
 Log = Callable[[str], object]
@@ -55,7 +55,7 @@ def uncertainty(
     Raises CaseError where the case is at fault or observes nothing, RunFailed where its own run fails, Interrupted.
     """
     whole, folder = source(case), Path(folder)
-    member = Member("base", whole, tuple(overrides))
+    member = Member(BASE, whole, tuple(overrides))
     base_case = member.resolved()
     wanted = _wanted(base_case, observe)
     with ExitStack() as stack:

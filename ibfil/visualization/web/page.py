@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import base64
 import json
-from collections.abc import Callable, Mapping, Sequence
-from html import escape
-from importlib.resources import files
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...analysis.body_meshes import extents
-from ...analysis.meshes import box_of, polylines, rods_of
+from ...analysis.meshes import polylines, rods_of
 from ...analysis.run import Run, open_run
-from ...assembly.fluids.models import fluid_model
 from ...errors import CaseError
 from ...io.overwriting import Kind, refuse, replacing
-from ...screen import printable, tell
-from ..camera import turned, upwards, viewpoint
-from ..quantities import FILAMENT, QUANTITIES, Scale, colours, scale_of
+from ...screen import tell
+from ..quantities import FILAMENT, OWN, QUANTITIES, Scale, scale_of
 from ..style import AXES, COLOURS, plane_of_motion, with_units
+from .constants import LEVELS, constants, filled, packed, shades, strokes
 
 PAGE = Kind("a page of ibfil", lambda path, head: b'<meta name="generator" content="ibfil">' in head[:512])
 COLOURED = ("tension", "curvature", "speed")
 MOST = 20.0  # MB of a page, at most
 SHEET = 96  # points along a side of the flow's plane, at most
 FIELDS = 60  # fields shown, at most
-LEVELS = 256  # of colours
-RING = 24  # strokes of a ring about a body
 
 
 def write_page(
@@ -61,7 +55,8 @@ def write_page(
         shown = list(dict.fromkeys([colour, *COLOURED, *([FILAMENT] if len(opened.filaments) > 1 else [])]))
         flow = _flow(opened)
         picked = _picked(opened, len(shown), flow, most, path)
-        text = _filled(opened.case.title or opened.path.stem, _content(opened, picked, shown, flow))
+        content = json.dumps(_content(opened, picked, shown, flow), allow_nan=False)
+        text = filled("web/page.html", opened.case.title or opened.path.stem, content, "web/draw.js", "web/page.js")
         count = len(opened)
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
@@ -83,19 +78,6 @@ def _picked(run: Run, quantities: int, flow: dict[str, Any] | None, most: float,
     return np.unique(np.linspace(0, len(run) - 1, count).round().astype(int))
 
 
-def _filled(title: str, content: dict[str, Any]) -> str:
-    """The page; in its data no character can end the script or begin markup."""
-    here = files(__package__)
-    page = (here / "page.html").read_text(encoding="utf-8")
-    data = json.dumps(content, allow_nan=False)
-    for char in "<>&\u2028\u2029":
-        data = data.replace(char, f"\\u{ord(char):04x}")
-    code = (here / "page.js").read_text(encoding="utf-8")
-    head, rest = page.split("@DATA@")
-    middle, tail = rest.split("@SCRIPT@")
-    return head.replace("@TITLE@", escape(printable(title))) + data + middle + code + tail
-
-
 def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str, Any] | None) -> dict[str, Any]:
     """All that the page knows of the run, as JSON: arrays as base64, little-endian."""
     every = [np.asarray(columns["position"])[picked] for columns in run.filaments.values()]
@@ -103,55 +85,31 @@ def _content(run: Run, picked: np.ndarray, shown: Sequence[str], flow: dict[str,
     both = np.concatenate([places, links.reshape(len(picked), -1, 3)], axis=1)
     low, high = both.min(axis=(0, 1)), both.max(axis=(0, 1))
     span = np.where(high > low, high - low, 1.0)
-    radii = np.concatenate([rod.radius for rod in rods_of(run).values()])
     ends = [each[picked] for each in extents(run)]
-    look = turned(viewpoint([*every, *ends]), None, None, upwards(run.case))
-    box, units = box_of(run), run.case.units
+    radii = np.concatenate([rod.radius for rod in rods_of(run).values()])
     return {
-        "title": printable(" ".join(run.case.title.split()) or run.path.stem),
-        "casetext": run.case_text,
+        **constants(run.case, run.path.stem, [*every, *ends], (low, high), radii),
         "times": [float(t) for t in run.time[picked]],
-        "timewords": "time #" + ("" if units.time == "1" else f" {units.time}"),
-        "lengthunit": "" if units.length == "1" else f" {units.length}",
         "counts": [p.shape[1] for p in every],
-        "positions": _packed(np.round((places - low) / span * 65535), "<u2"),
+        "positions": packed(np.round((places - low) / span * 65535), "<u2"),
         "links": links.shape[1],
-        "linewords": "; ".join(["lines: links"] * bool(run.links) + ["rings: bodies"] * bool(ends)),
-        "linked": _packed(np.round((links - low) / span * 65535), "<u2"),
-        "radius": _packed(radii, "<f4"),
+        "linked": packed(np.round((links - low) / span * 65535), "<u2"),
         "low": low.tolist(),
         "span": span.tolist(),
-        "centre": look.centre.tolist(),
-        "reach": max(0.5 * float(np.linalg.norm(high - low)) + float(radii.max()), 1e-300),
-        "towards": look.towards.tolist(),
-        "up": look.up.tolist(),
         "quantities": _quantities(run, picked, shown),
-        "box": None if box is None else box.tolist(),
-        "wall": fluid_model(run.case).wall,
         "flow": flow,
     }
 
 
 def _strokes(run: Run, picked: np.ndarray) -> np.ndarray:
-    """The two ends of each line (T, K, 2, 3): of the elements of all links, and three rings about each body."""
-    each = [np.stack([np.asarray(c["first"])[picked], np.asarray(c["second"])[picked]], 2) for c in run.links.values()]
-    turn = np.linspace(0.0, 2 * np.pi, RING + 1)[:, None]
-    for ends, columns in zip(extents(run), _sized(run), strict=True):
-        centre = np.asarray(columns["position"])[picked, None]
-        arms = [ends[picked, None, k] - centre for k in (0, 2, 4)]
-        for one, other in ((0, 1), (1, 2), (2, 0)):
-            ring = centre + np.cos(turn) * arms[one] + np.sin(turn) * arms[other]
-            each.append(np.stack([ring[:, :-1], ring[:, 1:]], axis=2))
-    return np.concatenate([np.zeros((len(picked), 0, 2, 3)), *each], axis=1)
-
-
-def _sized(run: Run) -> list[Mapping[str, Any]]:
-    """The columns of bodies that have a size."""
-    return [columns for name, columns in run.bodies.items() if any(run.case.bodies[name].shape.semi_axes)]
-
-
-def _packed(values: np.ndarray, kind: str) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()
+    """The strokes (T, K, 2, 3) of the outputs that are picked."""
+    kept = {"first", "second", "position", "e1", "e2", "e3", "markers"}
+    links, bodies = (
+        {name: {key: np.asarray(columns[key])[picked] for key in kept & set(columns)} for name, columns in part.items()}
+        for part in (run.links, run.bodies)
+    )
+    found = strokes(run.case, links, bodies)
+    return found if found.size else np.zeros((len(picked), 0, 2, 3))
 
 
 def _quantities(run: Run, picked: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
@@ -169,25 +127,19 @@ def _quantities(run: Run, picked: np.ndarray, names: Sequence[str]) -> list[dict
             bytes_of[name].append(np.round(np.nan_to_num(np.clip(share, 0, 1)) * (LEVELS - 1)))
     for name, scale in scales.items():
         if scale.names:
-            own = [_rgb(colour) for colour in COLOURS]
-            out.append({"words": name, "values": None, "map": own, "low": scale.names[0], "high": scale.names[-1]})
+            low, high = scale.names[0], scale.names[-1]
+            own = shades(f"{OWN}{len(COLOURS)}", len(COLOURS))
+            out.append({"words": name, "values": None, "map": own, "low": low, "high": high})
             continue
-        shades = [_rgb(colour[:3]) for colour in colours(scale.colours)(np.linspace(0, 1, LEVELS))]
         low, high = _ends(scale)
-        values = _packed(np.array(bytes_of[name]), "u1")
-        out.append({"words": scale.label, "values": values, "map": shades, "low": low, "high": high})
+        values = packed(np.array(bytes_of[name]), "u1")
+        out.append({"words": scale.label, "values": values, "map": shades(scale.colours), "low": low, "high": high})
     return out
 
 
 def _ends(scale: Scale) -> tuple[str, str]:
     below, above = ("\u2264 " if scale.below else ""), ("\u2265 " if scale.above else "")
     return f"{below}{scale.low:.3g}", f"{above}{scale.high:.3g}"
-
-
-def _rgb(colour: Any) -> list[int]:
-    from matplotlib.colors import to_rgb
-
-    return [round(255 * part) for part in to_rgb(colour)]
 
 
 def _flow(run: Run) -> dict[str, Any] | None:
@@ -220,8 +172,8 @@ def _flow(run: Run) -> dict[str, Any] | None:
     return {
         "shape": [u.shape[2], u.shape[1]],
         "times": [float(t) for t in times[picked]],
-        "speed": _packed(np.round(255 * speed / fastest), "u1"),
-        "arrows": _packed(np.round(127 * ways), "i1"),
+        "speed": packed(np.round(255 * speed / fastest), "u1"),
+        "arrows": packed(np.round(127 * ways), "i1"),
         "origin": corner.tolist(),
         "first": (np.eye(3)[a] * step[a] * u.shape[2]).tolist(),
         "second": (np.eye(3)[b] * step[b] * u.shape[1]).tolist(),

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import CaseError
+from ...errors import CaseError
+from .clouds import size
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
-    from ..case.bodies.end import End
-    from ..case.schema import Case
-    from ..rods.geometry import Configuration
-    from .stacked import RodStack
+    from ...bodies.body import Body
+    from ...case.bodies.end import End
+    from ...case.schema import Case
+    from ...rods.geometry import Configuration
+    from ..stacked import Copied, RodStack
 
 INSIDE = 0.5  # of a segment, that nodes may be within a body
 _PARALLEL = 1e-6
@@ -28,30 +29,39 @@ class InBody(NamedTuple):
     node: int
     where: slice
     twists: bool
+    filament: str  # its name
+    copied: Copied | None  # where it went as one of copies
 
 
 def attached_ends(rods: RodStack) -> list[InBody]:
     """The ends that are in bodies."""
     out = []
-    for filament, where in zip(rods.filaments, rods.nodes, strict=True):
+    each = zip(rods.names, rods.tables, rods.filaments, rods.nodes, rods.copied, strict=True)
+    for name, table, filament, where, copied in each:
+        number = name.removeprefix(table)  # of a copy, which is in the copy of a body
         for finish, (end, node) in enumerate(((filament.start, where.start), (filament.finish, where.stop - 1))):
             if end.attached:
-                out.append(InBody(end, bool(finish), node, where, filament.twisting is not None))
+                own = end if copied is None else end.model_copy(update={"body": end.body + number})
+                twists = filament.twisting is not None
+                out.append(InBody(own, bool(finish), node, where, twists, name, copied))
     return out
 
 
 def check_places(case: Case, rods: RodStack, ends: Sequence[InBody], bodies: Sequence[Body]) -> None:
     """Ends lie on their bodies, or within the size of these; rods do not run through them; a joint can turn one way."""
-    faults, names = [], list(case.bodies)
+    faults, tables, names = [], case.each_body, list(case.each_body)
     for at in ends:
-        body, table = bodies[names.index(at.end.body)], case.bodies[at.end.body]
-        filament = rods.names[next(k for k, where in enumerate(rods.nodes) if where == at.where)]
-        key = f"{case.file}: filament.{filament}.{'finish' if at.finish else 'start'}.body"
-        fault = _misplaced(at, body, np.array(table.shape.semi_axes), rods.start, case.filaments[filament].length)
+        body, table = bodies[names.index(at.end.body)], tables[at.end.body]
+        key = f"{case.file}: filament.{at.filament}.{'finish' if at.finish else 'start'}.body"
+        if body.cloud is None:
+            length = rods.filaments[rods.names.index(at.filament)].length
+            fault = _misplaced(at, body, np.array(table.shape.semi_axes), rods.start, length)
+        else:
+            fault = _away(at, body, body.cloud, rods.start)
         faults += [f"{key}: {fault.format(name=at.end.body)}"] if fault else []
-    for name, table in case.bodies.items():
+    for name, table in tables.items():
         own = [at for at in ends if at.end.body == name]
-        if not any(table.shape.semi_axes) and _in_line(own, rods.start):
+        if not size(case, name, table).any() and _in_line(own, rods.start):
             found = "found clamped filaments without twisting that leave a joint along one line, and may turn about it"
             faults.append(f"{case.file}: body.{name}: {found}; allowed: twisting, or hinged ends")
     if faults:
@@ -74,6 +84,15 @@ def _misplaced(at: InBody, body: Body, size: np.ndarray, start: Configuration, l
     deepest = -min(float(_outside(point, size)) for point in place)
     if deepest > INSIDE * segment * (1 + 1e-9):
         return f"found nodes up to {deepest:.3g} inside {{name}}; allowed: at most half a segment, {0.5 * segment:.3g}"
+    return ""
+
+
+def _away(at: InBody, body: Body, cloud: np.ndarray, start: Configuration) -> str:
+    """The fault of one end in a cloud of markers, as above: it may be as far off as the cloud is large."""
+    end = (start.r[at.node] - body.centre) @ body.axes
+    away, allowed = float(np.linalg.norm(cloud - end, axis=1).min()), float(np.ptp(cloud, axis=0).max())
+    if away > allowed:
+        return f"found an end {away:.3g} off the markers of {{name}}; allowed: at most its size, {allowed:.3g}"
     return ""
 
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bodies.supports import Component, Support, Supports
+from ...bodies.supports import Component, Support, Supports
 
 if TYPE_CHECKING:
+    from ..stacked import RodStack
     from .attached import InBody
-    from .stacked import RodStack
 
 
 def supports(rods: RodStack, ends: Sequence[InBody], names: Sequence[str]) -> Supports | None:

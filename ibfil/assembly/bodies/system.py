@@ -8,21 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bodies.body import NOTHING, Attachment, Body, Motor, OfTime
-from ..bodies.system import RodsWithBodies
-from ..case.table import ORIGIN
-from ..rods.boundary_conditions import spinning, steady, turned
+from ...bodies.body import NOTHING, Attachment, Body, Motor, OfTime
+from ...bodies.system import RodsWithBodies
+from ...case.table import ORIGIN
+from ...rods.boundary_conditions import spinning, steady, turned
+from ..loads import number, triple
 from .attached import InBody, attached_ends, check_places
-from .loads import number, triple
+from .clouds import cloud, size
 from .supports import supports
 
 if TYPE_CHECKING:
-    from ..case.bodies import body as tables
-    from ..case.bodies.motor import Motor as MotorTable
-    from ..case.schema import Case
-    from ..rods.base import Load
-    from ..rods.geometry import Configuration
-    from .stacked import RodStack
+    from ...case.bodies import body as tables
+    from ...case.bodies.motor import Motor as MotorTable
+    from ...case.schema import Case
+    from ...rods.base import Load
+    from ...rods.geometry import Configuration
+    from ..stacked import RodStack
 
 
 def with_bodies(case: Case, rods: RodStack) -> RodStack:
@@ -36,8 +37,9 @@ def with_bodies(case: Case, rods: RodStack) -> RodStack:
 
 def _system(case: Case, rods: RodStack) -> RodsWithBodies:
     """The system of the rods and the bodies."""
-    begin, names, ends = rods.start, list(case.bodies), attached_ends(rods)
-    bodies = [_body(table, [e for e in ends if e.end.body == name], begin) for name, table in case.bodies.items()]
+    begin, each, ends = rods.start, case.each_body, attached_ends(rods)
+    names = list(each)
+    bodies = [_body(case, name, table, [e for e in ends if e.end.body == name], begin) for name, table in each.items()]
     check_places(case, rods, ends, bodies)
     motors: list[Motor] = []
     driven, attachments = [], []
@@ -67,32 +69,40 @@ def _outside(rods: RodStack, own: Sequence[np.ndarray]) -> list[Load]:
     return [load for load in rods.system.loads if not any(load is other for other in inner)]
 
 
-def _body(table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> Body:
+def _body(case: Case, name: str, table: tables.Body, ends: Sequence[InBody], begin: Configuration) -> Body:
     """One body as it begins."""
+    own = size(case, name, table)
     x = np.array(table.axes[0]) / np.linalg.norm(table.axes[0])
     y = np.array(table.axes[1]) - (np.array(table.axes[1]) @ x) * x
     y /= np.linalg.norm(y)
     axes = np.column_stack([x, y, np.cross(x, y)])
+    copied = ends[0].copied if ends else None
+    if copied is not None:
+        axes = copied.turn @ axes
     given = table.given_motion
     turns = None if given is None else triple(given.turns, "t")
-    if not any(table.shape.semi_axes) and all(at.end.hinged for at in ends):
+    if not own.any() and all(at.end.hinged for at in ends):
         turns = _still  # a joint of hinges: nothing would tell how it turns
     return Body(
-        _centre(table, axes, ends, begin),
+        _centre(table, axes, ends, begin, own),
         axes,
         None if given is None else triple(given.moves, "t"),
         turns,
         _of_time(table.force),
         _of_time(table.torque),
         table.own_axes,
+        cloud(case, name, table),
     )
 
 
-def _centre(table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration) -> np.ndarray:
+def _centre(
+    table: tables.Body, axes: np.ndarray, ends: Sequence[InBody], begin: Configuration, size: np.ndarray
+) -> np.ndarray:
     """The centre (3,): as given, or such that the first end is on the surface, the centre behind its tangent."""
-    if table.position is not None or not ends:
-        return np.array(table.position or ORIGIN)
-    first, size = ends[0], np.array(table.shape.semi_axes)
+    if table.position is not None or table.shape.file is not None or not ends:
+        place = np.array(table.position or ORIGIN)
+        return place if not ends or ends[0].copied is None else ends[0].copied.place(place)
+    first = ends[0]
     out = begin.e3[first.node] * (-1.0 if first.finish else 1.0)  # from the body into the rod
     if not size.any():
         return begin.r[first.node].copy()

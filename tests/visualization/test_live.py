@@ -1,0 +1,361 @@
+"""A case that is played in a browser: it is the run of `ibfil run`; its page is for who has the token only."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import re
+import signal
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.browser import BROWSER, Tab
+from helpers.made_run import BENT
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+import ibfil
+from ibfil.errors import CaseError
+from ibfil.simulation.simulation import Simulation
+from ibfil.visualization.live import server
+from ibfil.visualization.live.controls import controls
+from ibfil.visualization.live.live import live
+from ibfil.visualization.live.played import Played
+from ibfil.visualization.live.session import Session
+from ibfil.visualization.live.viewers import Viewer, Viewers
+
+browses = pytest.mark.skipif(BROWSER is None, reason="no Chromium here: the page is served, and opened in no browser")
+SEEN = '[observe.tip]\nkind = "position"\nat = "finish"\n'
+THERMAL = '[thermal]\nenergy = 0.01\nseed = 3\n[observe.far]\nkind = "end_to_end"\n'
+BENT_BY = "filament.swimmer.curvature.0"
+HOSTILE = '</script><script>document.title="owned"</script><img src=x onerror=alert(1)> & "quotes"'
+
+
+def bent(more: str = SEEN, **changes: object) -> ibfil.Case:
+    return ibfil.parse_case(BENT + more, "bent.toml", {key.replace("__", "."): value for key, value in changes.items()})
+
+
+# --- controls ---------------------------------------------------------------------------------------------------------
+
+
+def test_numbers_formulas_words_and_switches_of_a_case_have_controls():
+    overrides = {"time.end": "6*pi/10", "filament.swimmer.twisting": 1.0, "filament.swimmer.radius": 0.01}
+    case = ibfil.read_case("swimmer_rft", overrides)
+    found = {one.path: one for one in controls(case)}
+    assert found["time.end"][2:4] == ("number", pytest.approx(0.6 * np.pi))
+    assert found["filament.swimmer.nodes"][2:4] == ("whole", 64)
+    assert found["filament.swimmer.curvature.0"][2:4] == ("formula", "8*sin(4*pi*s - 10*t)")
+    assert found["filament.swimmer.curvature.1"][2:4] == ("number", 0.0)
+    assert found["fluid.model"].kind == "word"
+    assert set(found["fluid.model"].words) >= {"rft", "stokes"}
+    assert found["observe.speed.over.1"].group == "observe.speed"
+    assert "viscosity eta" in found["fluid.viscosity"].help
+    assert not [path for path in found if path.split(".")[0] in ("title", "source", "expect") or path.endswith("kind")]
+
+
+def test_what_names_a_parameter_stays_a_formula_and_parameters_come_first():
+    every = controls(ibfil.read_case("cilia_row"))
+    assert every[0].path.startswith("parameters.")
+    found = {one.path: one for one in every}
+    assert found["filament.cilium.copies.at.0"][2:4] == ("formula", "apart*i")
+    assert found["fluid.box"].kind == "formula"
+
+
+@pytest.mark.parametrize("name", ["bacterium_free", "nine_rods", "brownian_ring", "swimmer_re_10"])
+def test_every_control_gives_its_value_back(name):
+    """All controls at once, set to what they show, leave the case as it is."""
+    case = ibfil.read_case(name)
+    same = ibfil.read_case(case, {one.path: one.value for one in controls(case)})
+    assert [one[:4] for one in controls(same)] == [one[:4] for one in controls(case)]
+
+
+# --- the run that is played -------------------------------------------------------------------------------------------
+
+
+class Cut(Exception):
+    """Between two steps."""
+
+
+@pytest.mark.parametrize("more", [SEEN, THERMAL], ids=["bent", "thermal"])
+def test_a_played_run_is_the_run_to_the_bit_however_often_it_is_looked_at(more):
+    case = bent(more)
+    result = ibfil.run(case, progress=False, log=lambda line: None)
+    played, rows, count = Played(case, "tension"), [], 0
+
+    def after_step() -> None:
+        nonlocal count
+        count += 1
+        played.picture()
+        if count % 3 == 0:
+            raise Cut
+
+    while not played.done:
+        try:
+            row, reason = played.go_on(after_step)
+        except Cut:
+            continue
+        assert reason == ""
+        rows.append(row)
+    assert [row["time"] for row in rows] == result.times.tolist()
+    for name in rows[0]["values"]:
+        np.testing.assert_array_equal([row["values"][name] for row in rows], result.series(name))
+    for one in played.numbers():
+        np.testing.assert_array_equal(one["value"], result.summaries[one["name"]].value)
+
+
+def test_a_picture_has_places_strokes_and_quantities_of_the_present():
+    case = ibfil.read_case("bacterium_free")
+    played = Played(case, "speed")
+    facts, picture = played.scene(), played.picture()
+    time, steps = np.frombuffer(picture[:16], "<f8")
+    numbers = np.frombuffer(picture[16:], "<f4")
+    n, strokes = sum(facts["counts"]), facts["links"]
+    assert (time, steps) == (0.0, 0.0)
+    np.testing.assert_allclose(numbers[: 3 * n].reshape(n, 3), played.simulation.configuration.r[:n], atol=1e-6)
+    ring = numbers[3 * n : 3 * n + 6 * strokes].reshape(strokes, 2, 3)
+    radius = case.bodies["head"].shape.semi_axes[0]
+    centre = played.simulation.snapshot().bodies["head"].position
+    np.testing.assert_allclose(np.linalg.norm(ring - centre, axis=-1), radius, rtol=1e-5)
+    names = [one["words"] for one in facts["quantities"]]
+    assert names[0].startswith("speed")
+    speed = np.linalg.norm(next(iter(played.simulation.snapshot().filaments.values())).velocity, axis=1)
+    np.testing.assert_allclose(numbers[3 * n + 6 * strokes :].reshape(len(names), n)[0], speed, rtol=1e-5)
+
+
+# --- a session --------------------------------------------------------------------------------------------------------
+
+
+class Page:
+    """A page without a browser: it keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[dict] = []
+        self.pictures = 0
+
+    def send(self, message: str | bytes) -> None:
+        if isinstance(message, str):
+            self.told.append(json.loads(message))
+        else:
+            self.pictures += 1
+
+    def of(self, word: str) -> list:
+        return [told[word] for told in self.told if word in told]
+
+
+def play(case: ibfil.Case, *orders: dict) -> Page:
+    """The page of a session that was asked these things, one after the other, and then played to its end."""
+    page, viewers = Page(), Viewers()
+    viewer = Viewer(page)
+    session = Session(case, viewers, "tension")
+    viewers.join(viewer)
+    viewers.ask({"pace": 0})
+    for order in orders:
+        viewers.ask(order)
+    looks = 0
+
+    def stop() -> bool:
+        nonlocal looks
+        looks += 1
+        return looks > 3 + len(orders) and session._ended != "" and not viewers.asked
+
+    session.play(stop)
+    viewer.tell('{"last": true}')
+    sender = threading.Thread(target=viewer.serve)
+    sender.start()
+    while not page.of("last"):
+        viewer.drawn()
+    viewer.leave()
+    sender.join()
+    return page
+
+
+def test_a_new_value_begins_again_and_its_case_is_what_runs():
+    page = play(bent(), {"set": {"fluid.viscosity": 2.0}})
+    scene = page.of("scene")[-1]
+    result = ibfil.run(ibfil.parse_case(scene["casetext"], "played"), progress=False, log=lambda line: None)
+    assert result.case.fluid.viscosity == 2.0
+    assert page.of("ended") == ["finished"]
+    rows = page.of("row")
+    last = rows[-len(result.times) :]
+    assert [row["time"] for row in last] == result.times.tolist()
+    np.testing.assert_array_equal([row["values"]["tip"] for row in last], result.series("tip"))
+    assert page.pictures > 0
+
+
+@pytest.mark.parametrize(
+    ("order", "told"),
+    [
+        ({"set": {"fluid.viscosity": -1}}, "fluid.viscosity: found -1; allowed: a number"),
+        ({"key": "fluid.viscosty=2"}, "fluid.viscosty: found an unknown key"),
+        ({"key": "time.end=__import__('os').system('touch owned')"}, "time.end: found"),
+        ({"set": {"filament.rod.nodes": [1]}}, "filament.rod.nodes: found [1]"),
+    ],
+)
+def test_a_bad_value_is_a_line_and_the_run_goes_on_as_it_was(order, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = play(bent(), order)
+    faults = page.of("faults")
+    assert len(faults) == 1
+    assert faults[0][0].startswith(told)
+    assert len(page.of("scene")) == 1
+    assert page.of("ended") == ["finished"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_fails_says_so_and_another_value_begins_again():
+    page = play(bent(time__max_steps=3))
+    failed = page.of("ended")[0]
+    assert failed.startswith("failed\n")
+    assert "time.max_steps" in failed
+    page = play(bent(time__max_steps=3), {"set": {"time.max_steps": 1000}})
+    assert page.of("ended")[-1] == "finished"
+
+
+def test_strange_orders_do_nothing():
+    strange = [{"set": 3}, {"pace": "x"}, {"pace": -1}, {"run": 1}, {"key": 7}, {"again": 0}, {}]
+    page = play(bent(), *strange)
+    assert page.of("ended") == ["finished"]
+    assert len(page.of("scene")) == 1
+    assert server._order("[1]") == server._order("{") == server._order(b"\xff") == {}
+
+
+def test_a_run_stands_still_while_nobody_looks():
+    viewers = Viewers()
+    session, looks = Session(bent(), viewers, "tension"), iter(range(5))
+    session.play(lambda: next(looks) > 3)
+    assert session._played.simulation.steps == 0
+
+
+# --- its server -------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def served(case: ibfil.Case):
+    """The address of a case that is played."""
+    said, end = queue.Queue(), threading.Event()
+    thread = threading.Thread(target=live, args=(case,), kwargs={"log": said.put, "stop": end.is_set})
+    thread.start()
+    try:
+        yield re.search(r"open (\S+)", said.get(timeout=120)).group(1)
+    finally:
+        end.set()
+        thread.join(30)
+    assert not thread.is_alive()
+    assert said.get() == "ended; nothing was written"
+
+
+def test_the_page_and_the_line_are_for_who_has_the_token_on_this_machine():
+    with served(bent()) as address:
+        base, token = address.split("?token=")
+        assert base.startswith("http://127.0.0.1:")
+        with urllib.request.urlopen(address) as answer:
+            page = answer.read().decode()
+            assert "text/html" in answer.headers["Content-Type"]
+        assert token not in page
+        for path, status in (("", 403), ("?token=x", 403), ("line", 403), (f"else?token={token}", 404)):
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(base + path)
+            assert refused.value.code == status
+            refused.value.close()
+        line = base.replace("http", "ws") + "line"
+        with pytest.raises(InvalidStatus):
+            connect(line)
+        with pytest.raises(InvalidStatus):
+            connect(f"{line}?token={token}", origin="https://example.org")
+        with connect(f"{line}?token={token}", origin="http://localhost:9999") as mine:
+            assert "scene" in json.loads(mine.recv(timeout=30))
+
+
+def test_words_of_a_case_are_no_markup_and_nothing_comes_from_outside():
+    with served(bent(title=HOSTILE)) as address, urllib.request.urlopen(address) as answer:
+        page = answer.read().decode()
+    assert page.count("<script") == page.count("</script>") == 2
+    assert "<img" not in page
+    page = page.replace("img src=x", "")  # which stands there as text
+    assert not re.search(r"(src|href)\s*=|https?://|//[a-z]+\.|@import|url\(|fetch\(|XMLHttp|innerHTML|eval\(", page)
+    assert "default-src 'none'" in page
+
+
+def test_another_colour_a_taken_port_and_a_missing_library_are_one_line(monkeypatch):
+    with pytest.raises(CaseError, match="--colour: found taste; allowed: tension"):
+        live(bent(), colour="taste")
+    with served(bent()) as address, pytest.raises(CaseError, match=r"--port: found \d+, which is taken; allowed"):
+        live(bent(), port=int(re.search(r":(\d+)/", address).group(1)), log=str)
+    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
+    with pytest.raises(CaseError, match=r"pip install 'ibfil\[web\]'"):
+        live(bent(), log=str)
+
+
+def test_ctrl_c_ends_it(tmp_path):
+    (tmp_path / "bent.toml").write_text(BENT)
+    words = [sys.executable, "-m", "ibfil", "live", "bent.toml", "time.end=9"]
+    environment = os.environ | {"PYTHONPATH": str(Path(ibfil.__file__).parents[1]), "PYTHONUNBUFFERED": "1"}
+    process = subprocess.Popen(words, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True)
+    address = next(line.split()[1] for line in process.stdout if line.startswith("open "))
+    with connect(address.replace("http", "ws").replace("/?", "/line?"), origin="http://127.0.0.1") as line:
+        assert "scene" in json.loads(line.recv(timeout=30))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0
+    assert process.stdout.read().endswith("ended; nothing was written\n")
+    process.stdout.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["bent.toml"]
+
+
+# --- in a browser -----------------------------------------------------------------------------------------------------
+
+
+def slide(tab: Tab, name: str, share: float) -> None:
+    """Move the slider of that name to a share of its way."""
+    tab.value(
+        f"""(() => {{ const one = document.querySelector('[aria-label="{name}"]');
+        one.value = {share} * one.max; one.dispatchEvent(new Event("input")); }})()"""
+    )
+
+
+@browses
+def test_a_browser_plays_the_swimmer_and_a_slider_bends_it(tmp_path):
+    with served(ibfil.read_case("swimmer_rft")) as address, Tab(tmp_path / "profile") as tab:
+        tab.go(address)
+        tab.until("Number(canvas.dataset.pictures) >= 10")
+        assert tab.value("now.time") > 0
+        tab.value('part("play").click(); part("again").click()')  # from the start, where it then is told to run
+        tab.until("canvas.dataset.time > 0")
+        tab.value('part("play").click()')
+        tab.until('part("play").textContent === "Run"')
+        tab.value('send({key: "filament.swimmer.nodes=65"})')  # a new scene stands at its start, for it is paused
+        tab.until("run.counts[0] === 65 && now !== null && now.time === 0")
+        before = (tab.until("Array.from(now.places)"), tab.picture())
+        assert tab.value('part("status").textContent') == ""
+        slide(tab, f"{BENT_BY}, number 1", 0.5)  # 8 -> 12: of the 24 at its end
+        tab.until('run.casetext.includes("12*sin(4*pi*s - 10*t)") && now !== null')
+        after = (tab.until("Array.from(now.places)"), tab.picture())
+        case = ibfil.parse_case(tab.value("run.casetext"), "played")
+        for places, one in ((before[0], ibfil.read_case(case, {BENT_BY: "8*sin(4*pi*s - 10*t)"})), (after[0], case)):
+            np.testing.assert_allclose(np.reshape(places, (-1, 3)), Simulation(one).configuration.r, atol=1e-6)
+        assert np.ptp(np.reshape(after[0], (-1, 3))[:, 1]) > 1.2 * np.ptp(np.reshape(before[0], (-1, 3))[:, 1])
+        assert before[1] != after[1]
+        tab.value("send({set: {'fluid.viscosity': 0}})")
+        assert "fluid.viscosity: found 0; allowed" in tab.until('part("fault").textContent')
+        assert tab.value('document.querySelectorAll(".bad").length') == 1
+        tab.value('part("play").click()')
+        tab.until("now.time > 0")
+        assert tab.faults == []
+
+
+@browses
+def test_a_browser_takes_hostile_words_as_text(tmp_path):
+    with served(bent(title=HOSTILE)) as address, Tab(tmp_path / "profile") as tab:
+        tab.go(address)
+        tab.until("Number(canvas.dataset.pictures) >= 1")
+        assert "owned" in tab.value("document.title")
+        assert tab.value("document.title") != "owned"
+        assert tab.value('part("title").textContent') == HOSTILE
+        assert tab.value('document.querySelectorAll("img").length') == 0
