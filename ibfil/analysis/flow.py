@@ -12,6 +12,7 @@ from ..errors import CaseError
 
 if TYPE_CHECKING:
     from ..assembly.fluids.base import FluidModel
+    from ..case.schema import Case
     from ..io.reader import GridRecord, RunFile
 
 
@@ -31,15 +32,20 @@ def flow_of(run: RunFile) -> Flow:
     if not run.case.fluid.on_grid:
         what = "resistive-force theory knows no flow between the rods"
         raise CaseError([f'{run.path}: fluid.model: found "rft"; {what}; allowed: a fluid on a grid'])
-    if fluid.flow_from_forces:
+    if fluid.flow_from_forces and not _leaves_out(run.case):
         return FlowOfForces(run, fluid)
     grid = run.grid
     if grid is None or "velocity" not in grid.fields:
         allowed = 'output.grid_every with "velocity" among output.fields'
-        raise CaseError(
-            [f"{run.path}: found no velocity field, which this fluid's flow is read from; allowed: {allowed}"]
-        )
+        why = "the flow is read from where output.copies_every leaves forces out"
+        why = why if _leaves_out(run.case) else "this fluid's flow is read from"
+        raise CaseError([f"{run.path}: found no velocity field, which {why}; allowed: {allowed}"])
     return FlowOfField(run, grid)
+
+
+def _leaves_out(case: Case) -> bool:
+    """Whether there are copies whose forces are not in the run file."""
+    return case.output.copies_every > 1 and any(filament.copies for filament in case.filaments.values())
 
 
 class FlowOfForces:

@@ -67,4 +67,4 @@ def stepper(case: Case, noise: Noise | None) -> timestepping_base.Stepper:
         return explicit.Explicit()
     if case.time.scheme == "semi-implicit":
         return semi_implicit.SemiImplicit()
-    return implicit.Implicit(case.time.order)
+    return implicit.Implicit(case.time.order, share=case.time.solver_error or 0.0)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
+from ..case.copies import number_of
 from ..case.table import expressions
 from ..rods.base import NoContact
 from ..rods.geometry import Configuration
@@ -80,6 +81,11 @@ class RodStack:
     def own(self, table: str) -> Filament:
         """The filament that the case gives that name, or its first copy."""
         return self.filaments[self.tables.index(table)]
+
+    def written(self, every: int) -> list[int]:
+        """The filaments that outputs have, by their place: of copies every so many-th (output.copies_every)."""
+        named = enumerate(zip(self.names, self.tables, strict=True))
+        return [k for k, (name, table) in named if name == table or number_of(name) % every == 0]
 
     def variation(self, table: str, expression: Expression) -> dict[str, np.ndarray]:
         """The values (k,) of i and phase over the copies of a filament, of those that a formula of it uses."""

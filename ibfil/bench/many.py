@@ -9,6 +9,10 @@ import json
 import subprocess
 import sys
 import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..case.schema import Case
 
 SCENE = """
 [filament.rod]
@@ -33,6 +37,9 @@ every = 1.0
 STEP = 0.025  # 25 a period
 FIRST = 2  # steps that are not counted: Euler's, and the one after
 PAIRS = ((50, 20, 200), (500, 2, 20))  # nodes a filament, filaments of 1,000 nodes, of 10,000
+SPACING, APART = 0.04, 0.08  # of the grid of a suspension, and between its rods, which are as thick: two cells
+SHARE = 0.01  # of a step's own error, to which a suspension's equations are solved
+SUSPENSION = ((200, 56), (20_000, 256))  # filaments of 50 nodes, cells: 10^4 and 10^6 nodes at one density
 LIBRARIES = 250 * 2**20  # bytes that `check` says libraries take
 
 
@@ -41,11 +48,24 @@ def scene(count: int, nodes: int, cells: int) -> str:
     return SCENE.format(count=count, nodes=nodes, cells=cells, step=STEP)
 
 
-def measure(count: int, nodes: int, cells: int, steps: int) -> dict[str, float | str]:
-    """Seconds a node and step; the bytes that `check` tells beforehand, and the peak of this process."""
+def suspension(count: int, nodes: int, cells: int) -> Case:
+    """The same in a box of as many cells a side, apart from each other as their thickness has it, at half the step."""
+    from ..case.reading import parse_case
+
+    side = SPACING * cells
+    half, region = 0.5 * side, "filament.rod.copies.region"
+    overrides = [
+        f"fluid.box=[{side}, {side}, {side}]",
+        f"{region}=[[-{half}, -{half}, -{half}], [{half}, {half}, {half}]]",
+    ]
+    overrides += [f"filament.rod.copies.apart={APART}", f"time.step={0.5 * STEP}", f"time.solver_error={SHARE}"]
+    return parse_case(scene(count, nodes, cells), "bench", [*overrides, "output.copies_every=100"])
+
+
+def measure(case: Case, steps: int) -> dict[str, float | str]:
+    """Seconds of the processors a node and step; the bytes that `check` tells, and the peak of this process."""
     import resource
 
-    from ..case.reading import parse_case
     from ..check import budget
     from ..linalg import gmres
     from ..simulation.simulation import Simulation
@@ -58,14 +78,14 @@ def measure(count: int, nodes: int, cells: int, steps: int) -> dict[str, float |
         products += found.products
         return found
 
-    simulation = Simulation(parse_case(scene(count, nodes, cells), "bench"))
+    simulation, step = Simulation(case), float(case.time.step)
     told = sum(budget.memory(simulation).values()) + LIBRARIES
-    simulation.advance(FIRST * STEP, lambda: None)
+    simulation.advance(FIRST * step, lambda: None)
     gmres.solve = counted
-    began = time.perf_counter()
-    for step in range(FIRST, FIRST + steps):
-        simulation.advance((step + 1) * STEP, lambda: None)
-    seconds = (time.perf_counter() - began) / (steps * count * nodes)
+    began = time.process_time()
+    for k in range(FIRST, FIRST + steps):
+        simulation.advance((k + 1) * step, lambda: None)
+    seconds = (time.process_time() - began) / (steps * simulation.rods.count)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
     return {
         "seconds": seconds,
@@ -77,18 +97,23 @@ def measure(count: int, nodes: int, cells: int, steps: int) -> dict[str, float |
     }
 
 
-def measured(count: int, nodes: int, cells: int, steps: int) -> dict:
-    """The same by a process of its own."""
-    words = [sys.executable, "-m", "ibfil.bench.many", *map(str, (count, nodes, cells, steps))]
+def measured(count: int, nodes: int, cells: int, steps: int, kind: str = "thrown") -> dict:
+    """The same by a process of its own, of swimmers ``thrown`` into a box or of a ``suspension``."""
+    words = [sys.executable, "-m", "ibfil.bench.many", *map(str, (count, nodes, cells, steps)), kind]
     return json.loads(subprocess.run(words, capture_output=True, check=True, text=True).stdout)
 
 
 def main(words: list[str]) -> None:
-    """COUNT NODES CELLS STEPS; prints the measurement."""
+    """COUNT NODES CELLS STEPS [KIND]; prints the measurement."""
     from ..threads import set_threads
 
     set_threads(1)
-    print(json.dumps(measure(*map(int, words))))
+    from ..case.reading import parse_case
+
+    count, nodes, cells, steps = map(int, words[:4])
+    apart = words[4:] == ["suspension"]
+    case = suspension(count, nodes, cells) if apart else parse_case(scene(count, nodes, cells), "bench")
+    print(json.dumps(measure(case, steps)))
 
 
 if __name__ == "__main__":

@@ -40,6 +40,20 @@ def many(cells: tuple[int, ...] = (64, 128), steps: int = 4) -> list[Row]:
     return rows
 
 
+def million(steps: int = 2, scenes: tuple[tuple[int, int], ...] = bench_many.SUSPENSION) -> list[Row]:
+    """10^6 nodes: a step against 10 s, time a node against that of 10^4 at the same density, memory against 4 GB."""
+    few, lots = (bench_many.measured(count, 50, cells, steps, "suspension") for count, cells in scenes)
+    (a, _), (b, cells) = scenes
+    name, step = f"{b} x 50, {cells}^3, apart", lots["seconds"] * 50 * b
+    how = f"products {lots['products']:.0f}, {few['products']:.0f}"
+    ratio = lots["seconds"] / few["seconds"]
+    return [
+        Row(f"{name}: a step, processor", step, "10 s on two", 20.0, step / 20.0, 1.0),
+        Row(f"{name}: a node and step ({how})", lots["seconds"], f"{a} x 50", few["seconds"], ratio, 1.0),
+        Row(f"{name}: peak memory", lots["peak"], "4 GB", 4e9, lots["peak"] / 4e9, 1.0, "B"),
+    ]
+
+
 def threads() -> list[Row]:
     """Two threads against one on a busy machine."""
     return [Row(**row) for row in bench_threads.measured()]
@@ -79,6 +93,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "studies": lambda: bench_studies.costs(),
     "threads": threads,
     "many": lambda: many(),
+    "million": lambda: million(),
     "members": lambda: bench_members.members(),
     "mpi": lambda: bench_processes.measured(),
 }
@@ -89,7 +104,7 @@ def main(json: bool = False, parts: Sequence[str] = ()) -> int:
     """Measures the parts asked for and prints a table, or JSON. Returns 0: a busy machine is no failure.
 
     The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB,
-    "members" some three minutes.
+    "members" some three minutes, "million" half an hour.
     Raises CaseError for a part there is not.
     """
     for part in set(parts) - set(PARTS):

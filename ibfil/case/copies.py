@@ -48,6 +48,11 @@ class Copies(Table):
         return isinstance(self.phase, str)
 
 
+def number_of(copy: str) -> int:
+    """The number of a copy from its name."""
+    return int(copy.rpartition("_")[2])
+
+
 def copy_names(name: str, copies: Copies | None) -> list[str]:
     """The names of all copies, as far as their number stands in the case: the name itself where there are none."""
     if copies is None or copies.count is None:

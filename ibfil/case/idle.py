@@ -29,6 +29,7 @@ def idle_keys(case: Case) -> list[str]:
         turns = fluid.rotation == "local" and any(f.twisting for f in case.filaments.values())
         spin = isinstance(fluid.drag, Coefficients) and fluid.drag.spin is not None
         idle["fluid"] += [] if turns and spin else ["drag"]
+    idle["output"] += [] if any(f.copies for f in case.filaments.values()) else ["copies_every"]
     placing = ["position", "anchor", "direction", "align", "normal"]
     idle |= {f"filament.{name}": placing for name, f in case.filaments.items() if f.shape.kind == "run"}
     written = [f"{table}.{key}" for table, names in idle.items() for key in names if key in _table(raw, table)]

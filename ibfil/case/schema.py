@@ -55,6 +55,9 @@ class Time(Table):
     end: Positive = Field(description="the run's last time", examples=[1.0])
     step: Annotated[float | Literal["auto"], Number(("auto",), low=0)] = Field("auto", description="time step")
     tolerance: Positive | None = Field(None, description="rms node error / L a unit time: adaptive steps")
+    solver_error: Positive | None = Field(
+        None, description="of implicit steps, over what extrapolation was off by; absent: 1e-8 of the length"
+    )
     max_steps: Count = Field(1_000_000, description="the run stops with an error after so many steps")
     min_step: Positive | None = Field(None, description="the run stops with an error below it; absent: 1e-12 of end")
     scheme: Literal["explicit", "semi-implicit", "implicit"] = Field(
@@ -90,6 +93,9 @@ class Output(Table):
         ("velocity",), description="which fields"
     )
     grid_stride: Count = Field(1, description="every so many cells of a field")
+    copies_every: Count = Field(
+        1, description="every so many-th copy of a filament is written, and observed; all are computed"
+    )
     window: Sizes | None = Field(None, description="sides of the part of free space whose fields are written")
     window_at: Vector | None = Field(
         None, description="its middle; the origin by default, or such that it stands on the wall"

@@ -68,7 +68,8 @@ def memory(simulation: Simulation) -> dict[str, float]:
 
 def disk(simulation: Simulation) -> float:
     """Bytes of the run file, at most: fields are compressed."""
-    case, n = simulation.case, simulation.rods.count
+    case, rods = simulation.case, simulation.rods
+    n = sum(rods.nodes[k].stop - rods.nodes[k].start for k in rods.written(case.output.copies_every))
     dues = due_times(case, simulation.grid is not None)
     size = sum(due.output for due in dues) * n * 8.0 * (20 if simulation.system.unknowns == 3 else 26)
     if simulation.grid is not None and case.output.grid_every is not None:

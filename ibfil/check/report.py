@@ -53,6 +53,8 @@ def _section(title: str, lines: list[str]) -> list[str]:
     return [f"{title}:", *(f"  {line}" for line in lines), ""]
 
 
+LARGE = 50_000  # nodes, beyond which some hundred velocities are no matter of seconds
+
 _MOTIONS = {"moves": "prescribed motion", "spin": "spin", "angle": "prescribed turn"}
 
 
@@ -178,7 +180,9 @@ def _costs(simulation: Simulation) -> list[str]:
     parts = ", ".join(f"{name} {_bytes(size)}" for name, size in used.items())
     lines.append(f"memory {_bytes(sum(used.values()))} ({parts}), beside some 250 MiB of libraries")
     lines += fluid.remarks()
-    lines.append(f"disk at most {_bytes(disk(simulation))}, fields compressed")
+    written, whole = len(simulation.rods.written(case.output.copies_every)), len(simulation.rods.names)
+    some = "" if written == whole else f", of {written} of {whole} filaments"
+    lines.append(f"disk at most {_bytes(disk(simulation))}{some}, fields compressed")
     methods = simulation.model.seconds
     if len(methods) > 1:
         others = ", ".join(f"{k} {v:.2g}" if np.isfinite(v) else f"{k} too large" for k, v in methods.items())
@@ -221,7 +225,9 @@ def _steps(simulation: Simulation) -> list[str]:
     if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
         lines.append("explicit steps too solve a linear system each: nodes feel their own velocity (fluid.thick)")
     limit = "not with bodies" if case.bodies else "not with mass"
-    if not case.heavy and not case.bodies:
+    if simulation.rods.count > LARGE:
+        limit = f"its limit is not looked for beyond {LARGE} nodes"
+    elif not case.heavy and not case.bodies:
         most = simulation.explicit_limit()
         limit = f"stable below dt = {most:.3g} at the start shape, 2/rho(M K)"
         if not np.isfinite(most):

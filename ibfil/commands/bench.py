@@ -14,7 +14,7 @@ def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     words = (
         "pieces, swimmer (the usual two), start, spaces, thermal, links, body, studies, large, threads, many, "
-        "members, mpi"
+        "members, million, mpi"
     )
     command.add_argument("parts", nargs="*", metavar="PART", help=words)
     command.add_argument("--json", action="store_true", help="as JSON")

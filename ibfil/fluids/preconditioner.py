@@ -7,7 +7,7 @@ made from is part of a run's state, so that a resumed run has the same one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -117,12 +117,16 @@ class Matrix(NamedTuple):
 
     def factored(self, nodes: Nodes, tau: float, rods: RodStiffness, groups: tuple[Group, ...]) -> Blocks:
         """The factors of the systems of groups of filaments, each by itself."""
-        parts, c = [], self.parts
-        for group in groups:
-            at = nodes_of(group)
-            matrix = self.of(nodes[at], self.own[at])
-            parts.append(((c * at[:, None] + np.arange(c)).ravel(), rods.system(group, matrix, tau)))
-        return gmres.factored(parts, rods.held, self.units)
+        c = self.parts
+
+        def parts() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+            for group in groups:
+                at = nodes_of(group)
+                matrix = self.of(nodes[at], self.own[at])
+                yield (c * at[:, None] + np.arange(c)).ravel(), rods.system(group, matrix, tau)
+
+        sizes = [c * sum(where.stop - where.start for where in group) for group in groups]
+        return gmres.factored(parts, sizes, rods.held, self.units)
 
 
 class Preconditioner(Protocol):
@@ -155,7 +159,10 @@ class WholeMatrix:
             n = len(asked.nodes.axes)
             system = rods.system((slice(0, n),), self.mobility, asked.tau)
             every = np.arange(self._matrix.parts * n)
-            self._known = rods.stiffness, gmres.factored([(every, system)], rods.held, self._matrix.units)
+            self._known = (
+                rods.stiffness,
+                gmres.factored(lambda: [(every, system)], [len(every)], rods.held, self._matrix.units),
+            )
         return _checked(gmres.solve(asked.product, right, self._known[1], _EXACT, MOST))
 
 

@@ -8,14 +8,17 @@ millionth may hide a solution that is wrong throughout.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from .lapack import dgetrf, dgetrs
 
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none
+_LARGE = 2**24  # bytes of double precision beyond which factors are kept in single precision
+_SINGLE = 0.01  # relative error of these that a preconditioner may have
 CYCLE = 60  # vectors GMRES keeps
 
 Product = Callable[[np.ndarray], np.ndarray]
@@ -54,28 +57,102 @@ class Blocks(NamedTuple):
     the force that would move it by one of them.
     """
 
-    factors: list[tuple[np.ndarray, Factors]]
+    lu: np.ndarray  # the factors of all blocks, row by row, one after the other; single precision where they are large
+    start: np.ndarray  # (b + 1,) where the unknowns of each begin in the two that follow
+    at: np.ndarray  # (n,) the unknowns
+    rows: np.ndarray  # (n,) the same in the order of pivots
+    units: np.ndarray  # (n,) of rows
     scale: np.ndarray
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """The approximate x (n,)."""
         out = np.empty_like(right)
-        for at, factors in self.factors:
-            out[at] = factors.solve(right[at])
+        _substitute(self.lu, self.start, self.at, self.rows, self.units, right, out)
         return out
 
 
-def factored(parts: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray, units: np.ndarray | None = None) -> Blocks:
-    """The factors of square blocks, by the unknowns (k,) each stands for, given transposed; overwrites them.
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _substitute(lu, start, at, rows, units, right, out):
+    """Forward and backward through the factors of each block, by products of rows, which are read once."""
+    place, room = 0, np.empty(np.max(start[1:] - start[:-1]))
+    for b in range(len(start) - 1):
+        first, n = start[b], start[b + 1] - start[b]
+        for i in range(n):
+            row, total = place + i * n, 0.0
+            for j in range(i):
+                total += lu[row + j] * room[j]
+            room[i] = right[rows[first + i]] / units[rows[first + i]] - total
+        for i in range(n - 1, -1, -1):
+            row, total = place + i * n, 0.0
+            for j in range(i + 1, n):
+                total += lu[row + j] * room[j]
+            room[i] = (room[i] - total) / lu[row + i]
+        for i in range(n):
+            out[at[first + i]] = room[i]
+        place += n * n
 
-    ``units`` (n,) are those of moves; None: one.
+
+Parts = Callable[[], Iterable[tuple[np.ndarray, np.ndarray]]]  # the unknowns (k,) and the system (k, k) of each block
+
+
+def bytes_of(sizes: Iterable[int]) -> float:
+    """The bytes of the factors of square blocks of ``sizes``: many are kept in single precision."""
+    double = 8.0 * sum(float(n) ** 2 for n in sizes)
+    return double if double <= _LARGE else 0.5 * double
+
+
+def factored(parts: Parts, sizes: Sequence[int], held: np.ndarray, units: np.ndarray | None = None) -> Blocks:
+    """The factors of square blocks of ``sizes``, by the unknowns each stands for, given transposed; overwrites them.
+
+    ``units`` (n,) are those of moves; None: one. Many are kept in single precision, as a preconditioner may be, unless
+    one of them is so stiff that this would make it another. ``parts`` may be asked again.
     """
-    diagonal = np.empty(sum(len(at) for at, _ in parts))
-    for at, system in parts:
-        diagonal[at] = np.diag(system)
-    scale = np.ones(len(diagonal)) if units is None else units.copy()
+    large = bytes_of(sizes) < 8.0 * sum(float(n) ** 2 for n in sizes)
+    found = _factored(parts(), sizes, held, units, np.float32) if large else None
+    return found or _factored(parts(), sizes, held, units, np.float64)  # type: ignore[return-value]
+
+
+def _factored(
+    parts: Iterable[tuple[np.ndarray, np.ndarray]],
+    sizes: Sequence[int],
+    held: np.ndarray,
+    units: np.ndarray | None,
+    number: type,
+) -> Blocks | None:
+    """The same in precision ``number``; None where single precision does not serve."""
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    n, place = int(start[-1]), 0
+    lu: np.ndarray = np.empty(sum(k * k for k in sizes), number)
+    at, rows = np.empty(n, np.int64), np.empty(n, np.int64)
+    scale, diagonal = np.ones(n) if units is None else units.copy(), np.empty(n)
+    every = np.ones(n) if units is None else units
+    for b, (unknowns, system) in enumerate(parts):
+        size, here = len(unknowns), slice(start[b], start[b + 1])
+        diagonal[unknowns] = np.diag(system)
+        probe = every[unknowns] * np.cos(np.arange(size))
+        image = probe @ system if number is np.float32 else probe
+        factors = factor(system, None if units is None else units[unknowns])
+        lu[place : place + size * size] = factors.lu.ravel()  # by rows
+        at[here], rows[here] = unknowns, unknowns[_order(factors.pivots)]
+        if number is np.float32:
+            one, back = np.array([0, size]), np.empty(size)
+            here_lu, own = lu[place : place + size * size], every[unknowns]
+            _substitute(here_lu, one, np.arange(size), _order(factors.pivots), own, image, back)
+            if not np.abs((back - probe) / own).max() < _SINGLE:
+                return None
+        place += size * size
     scale[held] /= diagonal[held]
-    return Blocks([(at, factor(system, None if units is None else units[at])) for at, system in parts], scale)
+    return Blocks(lu, start, at, rows, every, scale)
+
+
+@njit(cache=True)
+def _order(pivots):
+    """The order of rows (k,) that LAPACK's exchanges lead to."""
+    order = np.arange(len(pivots))
+    for i in range(len(pivots)):
+        j = pivots[i]
+        order[i], order[j] = order[j], order[i]
+    return order
 
 
 class GmresResult(NamedTuple):

@@ -7,7 +7,7 @@ each copy's, and the mean and the spread are of the numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +33,7 @@ class OverCopies:
     """
 
     def __init__(self, case: Case, observe: Observe) -> None:
-        self._case, self._observe, self._how = case, observe, observe.copies
+        self._case, self._observe, self._how, self._step = case, observe, observe.copies, case.output.copies_every
         self._made: dict[int, ObservableBase] = {}
         first = self._of(0)
         if not isinstance(first, OfFilament):
@@ -48,16 +48,20 @@ class OverCopies:
         self.over, self.recorded, self.filament = first.over, first.recorded, observe.filament
 
     def _of(self, number: int) -> ObservableBase:
-        """That of one copy."""
+        """That of one of the copies that are written, by its place among them."""
         if number not in self._made:
-            name = copy_name(self._observe.filament, number)
+            name = self._named(number)
             own = self._observe.model_copy(update={"copies": "none", "filament": name})
             self._made[number] = KINDS[own.kind](self._case, own)
         return self._made[number]
 
+    def _named(self, number: int) -> str:
+        """Its name."""
+        return copy_name(self._observe.filament, number * self._step)
+
     def sample(self, snapshot: Snapshot) -> Value:
         """The mean or spread at one output, or the value of each copy (k,) or (k, 3)."""
-        count = sum(1 for _ in _copies(snapshot, self._observe.filament))
+        count = next(k for k in itertools.count() if self._named(k) not in snapshot.filaments)
         values = np.array([self._of(number).sample(snapshot) for number in range(count)], float)
         return values if self.each else plain(_OVER[self._how](values))
 
@@ -75,22 +79,14 @@ class OverCopies:
         count = samples.shape[1]
         without = [k for k in range(count) if not np.all(np.isfinite(self._of(k).summary(times, samples[:, k])))]
         if without:
-            first = copy_name(self.filament, without[0])
+            first = self._named(without[0])
             return f"{len(without)} of {count} copies have no number, {first} being the first"
         found = self._of(0).quality(times, samples[:, 0])
-        return f"{copy_name(self.filament, 0)}: {found}" if found else ""
+        return f"{self._named(0)}: {found}" if found else ""
 
     def error(self, times: np.ndarray, samples: np.ndarray) -> StandardError | None:
         """The standard error of the mean over time of what the series is, where the run is thermal."""
         return None if self.each else self._of(0).error(times, samples)
-
-
-def _copies(snapshot: Snapshot, filament: str) -> Iterator[str]:
-    """The names of the copies that there are."""
-    number = 0
-    while copy_name(filament, number) in snapshot.filaments:
-        yield copy_name(filament, number)
-        number += 1
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
@@ -104,18 +100,19 @@ _OVER = {"mean": lambda values: values.mean(axis=0), "spread": _spread, "all": l
 def number_parts(case: Case, name: str, value: Value) -> dict[str, np.ndarray]:
     """The floats of an observable's number by label: "" of one, x, y, z of a vector, 000, 001 ... of copies."""
     entry = case.observe.get(name)
-    return _parts(np.asarray(value, float)[None], entry is not None and entry.of_each, 0)
+    return _parts(case, np.asarray(value, float)[None], entry is not None and entry.of_each, 0)
 
 
 def series_parts(case: Case, name: str, values: np.ndarray) -> dict[str, np.ndarray]:
     """The series (T,) that the series (T, ...) called ``name`` is of, by the same labels; 000_x with both."""
     entry = next((one for own, one in case.observe.items() if one.recorded(own) == name), None)
     each = entry is not None and (entry.of_each or (entry.over_copies and KINDS[entry.kind].fitted))
-    return _parts(values, each, slice(None))
+    return _parts(case, values, each, slice(None))
 
 
-def _parts(values: np.ndarray, each: bool, rows: int | slice) -> dict[str, np.ndarray]:
-    copies = [(f"{k:03d}", (k,)) for k in range(values.shape[1])] if each else [("", ())]
+def _parts(case: Case, values: np.ndarray, each: bool, rows: int | slice) -> dict[str, np.ndarray]:
+    every = case.output.copies_every
+    copies = [(f"{k * every:03d}", (k,)) for k in range(values.shape[1])] if each else [("", ())]
     letters = [(letter, (k,)) for k, letter in enumerate("xyz")] if values.ndim > 1 + each else [("", ())]
     return {
         "_".join(filter(None, (number, letter))): values[(rows, *at, *axis)]

@@ -29,12 +29,19 @@ class Diagnostics:
         """The fluid's own outputs, made when they are first asked for."""
         return self._model.fluid_model.output(self._rods, self._model.inner)
 
+    @cached_property
+    def _written(self) -> list[tuple[str, Filament, slice]]:
+        """Names, filaments and nodes of those that are written."""
+        rods = self._rods
+        which = rods.written(self._model.case.output.copies_every)
+        return [(rods.names[k], rods.filaments[k], rods.nodes[k]) for k in which]
+
     def snapshot(self, now: SolvedState, fields: Sequence[str] = ()) -> Snapshot:
-        """All filaments with diagnostics, and the ``fields`` named."""
+        """The filaments that are written, with diagnostics of all, and the ``fields`` named."""
         configuration = now.state.configuration
         moment, strain = self._nodal_moment(now.state)
         filaments = {}
-        for name, description, where in zip(self._rods.names, self._rods.filaments, self._rods.nodes, strict=True):
+        for name, description, where in self._written:
             segment = slice(where.start, where.stop - 1)
             stretch = configuration.length[segment] / self._mechanics.mesh.ds[segment] - 1.0
             ends = (

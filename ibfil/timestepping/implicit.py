@@ -78,7 +78,8 @@ class Implicit:
     1. from near the extrapolated positions, for as long as corrections shrink fast. Segments keep their length there:
        extrapolated ones are stretched by half the square of their turn, against which a stiff rod pulls so hard that
        the linear answer is far off. The matrix of the iteration before serves again where the fluid keeps its factors
-       and the last correction was small, ``again`` of what it corrected;
+       and the last correction was small, ``again`` of what it corrected. The first correction is what extrapolation
+       was off by, as large as the error of a step: with a ``share`` Newton stops at that part of it;
     2. from the start of the step, compressive geometric stiffness left out of the matrix in the first iteration, and
        in any whose correction would be four times the last one without that;
     3. as 2, but from the extrapolated positions and with corrections cut so that no segment changes by more than
@@ -89,6 +90,7 @@ class Implicit:
     tolerance: float = 1e-8  # largest correction of a node: of the length, and in radians of its turn
     most: int = 12  # iterations, each time
     stride: float = 0.1  # of a segment
+    share: float = 0.0  # of the first correction: an error of the solution that serves; zero: ``tolerance`` alone
     again: tuple[float, float] = (0.3, 0.08)  # a first correction of the displacement, others of the one before
 
     def step(self, system: System, fluid: Fluid, state: State, dt: float) -> Step:
@@ -141,6 +143,7 @@ class Implicit:
         Where they shrink more slowly another solution may be on the way, as where a soft rod kinks.
         """
         system, last, rate, exact, fresh = equation.system, _size(y, equation.system.length), np.inf, 0, False
+        enough = self.tolerance
         for count in range(1, self.most + 1):
             force, inner = system.forces(configuration, equation.time)
             before, fresh = fresh, rate > self.again[count > 2] or not equation.response.keeps
@@ -150,6 +153,7 @@ class Implicit:
             held = equation.prescribed(y, configuration, inner)
             answer = equation.response.implicit(force, matrix, held, y, equation.target, ERROR)
             size = _size(answer.move, system.length)
+            enough = max(enough, self.share * size) if count == 1 else enough
             rate = size / max(last, self.tolerance)
             if not rate < (0.25 if fresh and before else 1.0):
                 break
@@ -158,7 +162,7 @@ class Implicit:
             # takes the same part of it each time, which it has to show once.
             known = 10 * rate**2 if exact == count > 2 else 1.0 if before and not fresh else rate
             coming = size * max(known, WORST * answer.error) if count > 1 else size
-            if coming < self.tolerance:
+            if coming < enough:
                 return y, answer, count
             configuration, last = system.move(equation.start, y), size
         raise NotConverged(f"corrections do not shrink after {count} iterations", 0)

@@ -49,7 +49,8 @@ def test_many_filaments_and_threads_are_measured_in_processes_of_their_own(monke
     rows = parts.many(cells=(16,), steps=1)
     assert [row.bar for row in rows] == [3.0, 1.0, None] * 2
     assert rows[2].ratio == 2.9e8 / 3e8
-    asked = [sys.executable, "-m", "ibfil.bench.many", "2", "8", "16", "1"]
+    assert [row.bar for row in parts.million(1, ((2, 16), (4, 20)))] == [1.0, 1.0, 1.0]
+    asked = [sys.executable, "-m", "ibfil.bench.many", "2", "8", "16", "1", "suspension"]
     found = json.loads(subprocess.run(asked, capture_output=True, check=True, text=True).stdout)
     assert 0 < found["seconds"] < found["peak"]
     assert found["method"] == "table"

@@ -249,6 +249,10 @@ COMBINATIONS = [
     (["time.scheme=semi-implicit", "time.order=2"], "time.order", "implicit"),
     (["time.step=1e-14"], "time.step", "1e-12 of time.end"),
     (["time.step=1e-6", "time.min_step=1e-5"], "time.step", "min_step"),
+    (["time.scheme=explicit", "time.solver_error=0.01"], "time.solver_error", "implicit steps of order 2"),
+    (["time.order=1", "time.solver_error=0.01"], "time.solver_error", "implicit steps of order 2"),
+    ([*THERMAL, "time.solver_error=0.01"], "time.solver_error", "implicit steps of order 2"),
+    (["time.solver_error=0.2"], "time.solver_error", "at most 0.1"),
     # output
     (["output={}"], "output.every", "a list of times"),
     (["output.times=[0, 1]"], "output.every", "every and times"),

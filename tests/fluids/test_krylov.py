@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.scenes import swimmer
 
+from ibfil.bench import many
 from ibfil.case.reading import parse_case
 from ibfil.check.budget import memory
 from ibfil.errors import CaseError
@@ -193,6 +194,42 @@ def test_the_system_of_rods_is_their_statement(unknowns, condensation):
         assert np.allclose(gmres.factor(system.copy()).solve(expected), x[within], rtol=0, atol=1e-8)
 
 
+NOTHING = gmres.Blocks(*[np.zeros(0)] * 6)
+
+
+@pytest.mark.parametrize("number", ["double", "single"])
+def test_factored_blocks_solve_each_system(number, monkeypatch):
+    rng, sizes = np.random.default_rng(3), [5, 12, 1, 40]
+    order, units = rng.permutation(sum(sizes)), 10.0 ** rng.integers(-3, 4, sum(sizes))
+    at = np.split(order, np.cumsum(sizes)[:-1])
+    systems = [rng.normal(size=(n, n)) + np.diag(rng.choice([-9.0, 0.0, 9.0], n)) for n in sizes]
+    systems = [units[k][:, None] * system / units[k] for k, system in zip(at, systems, strict=True)]
+
+    def parts():
+        return [(k, system.T.copy()) for k, system in zip(at, systems, strict=True)]
+
+    monkeypatch.setattr(gmres, "_LARGE", 0 if number == "single" else 2**30)
+    blocks = gmres.factored(parts, sizes, at[1][:2], units)
+    assert blocks.lu.dtype == (np.float32 if number == "single" else np.float64)
+    x = units * rng.normal(size=sum(sizes))
+    right = np.empty_like(x)
+    for k, system in zip(at, systems, strict=True):
+        right[k] = system @ x[k]
+    limit = 1e-3 if number == "single" else 1e-10
+    assert np.abs((blocks.solve(right) - x) / units).max() < limit
+    held = units[at[1][:2]] / np.diag(systems[1])[:2]
+    assert blocks.scale[at[1][:2]] == pytest.approx(held, rel=1e-14)
+
+
+def test_a_block_too_stiff_for_single_precision_is_kept_in_double(monkeypatch):
+    n = 8
+    rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(n, n)))[0]
+    stiff = rotation @ np.diag(np.logspace(0, 11, n)) @ rotation.T
+    monkeypatch.setattr(gmres, "_LARGE", 0)
+    blocks = gmres.factored(lambda: [(np.arange(n), stiff.T.copy())], [n], np.zeros(0, np.int64))
+    assert blocks.lu.dtype == np.float64
+
+
 def _rounds(kept, products):
     """For each round of solves, of so many products, whether the factors are made anew after it."""
     made = []
@@ -200,13 +237,13 @@ def _rounds(kept, products):
         kept.now += count
         made.append(kept.end_round())
         if made[-1]:
-            kept.renew(gmres.Blocks([], np.ones(0)), 1.0)
+            kept.renew(NOTHING, 1.0)
     return made
 
 
 def test_a_preconditioner_is_kept_while_that_is_cheaper_than_the_mean():
     kept = preconditioner.KeptFactors(100.0)
-    kept.renew(gmres.Blocks([], np.ones(0)), 1.0)
+    kept.renew(NOTHING, 1.0)
     assert kept.fits(0.8)
     assert not kept.fits(0.5)
     # (100 + 10)/1, (100 + 30)/2 = 65, (100 + 80)/3 = 60 < 90: the fourth round was one too many
@@ -217,9 +254,30 @@ def test_a_preconditioner_is_kept_while_that_is_cheaper_than_the_mean():
 
 def test_a_preconditioner_that_serves_once_is_made_each_round_but_for_a_trial():
     kept = preconditioner.KeptFactors(5.0)
-    kept.renew(gmres.Blocks([], np.ones(0)), 1.0)
+    kept.renew(NOTHING, 1.0)
     made = []
     for _ in range(12):
         made += _rounds(kept, [40 if not made or made[-1] else 60])
     assert made[:3] == [False, True, True]
     assert made.count(False) == 2  # the trials
+
+
+def test_a_part_of_the_error_of_a_step_is_solved_for_with_fewer_products(monkeypatch):
+    """Each solution differs from the exact one by less than that part of what steps twice as short change."""
+    text = many.scene(20, 20, 32)
+    found, counts, solve = {}, {}, gmres.solve
+    for name, overrides in {"exact": (), "loose": ("time.solver_error=0.01",), "fine": ("time.step=0.0125",)}.items():
+        counts[name] = 0
+
+        def counted(*given, name=name):
+            answer = solve(*given)
+            counts[name] += answer.products
+            return answer
+
+        monkeypatch.setattr(gmres, "solve", counted)
+        simulation = Simulation(parse_case(text, "many", ("fluid.method=krylov", *overrides)))
+        simulation.advance(0.2, lambda: None)
+        found[name] = simulation.state_now.configuration.r.copy()
+    assert counts["loose"] < 0.75 * counts["exact"]
+    loose, step = (np.abs(found[name] - found["exact"]).max() for name in ("loose", "fine"))
+    assert 0 < loose < 0.01 * step

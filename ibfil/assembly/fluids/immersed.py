@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...linalg.gmres import bytes_of
 from .. import costs
 from .. import grid as grids
 from ..drag import drag
@@ -156,10 +157,10 @@ class ImmersedModel(ImmersedBodiesModel):
         if rods.bodies:
             out["bodies by nodes"] = 5 * 8.0 * rods.count * m * (6 * len(rods.bodies) + len(rods.motors))
         if method == "krylov":
-            band = 8.0 * n * m * m * (2 * rods.system.profile.width + 1)
+            kept = 2 * 8.0 * n * m * m * (2 * rods.system.profile.width + 1)  # the stiffness of factors, and a copy
             alone = [sum(both) for both in self.counts(rods)] if rods.bodies else None
-            blocks = sum(8.0 * (self.components * k) ** 2 for k in alone or rods.group_sizes)
-            out["preconditioner"] = (4 if alone else 1) * blocks + 2 * band
+            blocks = bytes_of(self.components * k for k in alone or rods.group_sizes)
+            out["preconditioner"] = (4 if alone else 1) * blocks + kept
             out["Krylov vectors"] = 60 * 8.0 * self.components * n
         else:
             out["dense matrices"] = costs.dense_bytes(n, self.components)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..copies import copy_name
+from ..copies import copy_name, number_of
 from ..expressions import suggestion
 from ..faults import Fault, shown
 from ..filament import single
@@ -29,6 +29,19 @@ def check_observed(case: Scene) -> Iterator[Fault]:
 def _observe(case: Scene) -> Iterator[Fault]:
     for name, entry in case.observe.items():
         yield from _observed(f"observe.{name}", entry, case)
+        if case.output.copies_every > 1:
+            yield from _unwritten(f"observe.{name}", entry, case)
+
+
+def _unwritten(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
+    """Faults of what looks at copies that are not written."""
+    every, reads = case.output.copies_every, ("output.copies_every",)
+    if entry.pumps and any(filament.copies for filament in case.filaments.values()):
+        yield Fault(f"{key}.kind", f"{shown(entry.kind)}, which takes all copies", "output.copies_every = 1", reads)
+    one = None if entry.filament in case.filaments else single(case.filaments, entry.filament)
+    if one is not None and number_of(entry.filament) % every:
+        allowed = f"a copy that is written: every {every}th, {copy_name(entry.filament.rpartition('_')[0], every)}"
+        yield Fault(f"{key}.filament", shown(entry.filament), allowed, reads)
 
 
 def _observed(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:

@@ -12,7 +12,7 @@ from itertools import pairwise
 from ..expressions import ExpressionError
 from ..faults import Fault, shown
 from ..fluid import Coefficients, Fluid, Matched
-from ..schema import Scene
+from ..schema import Scene, Time
 from .bodies import check_bodies
 from .closed import check_closed
 from .filament import check_filament
@@ -25,6 +25,7 @@ from .thermal import check_thermal
 from .thickness import check_thickness
 
 THINNEST = {"slender": (0.5 * math.exp(-0.5), "L/(2 sqrt(e))"), "cylinder": (0.25, "L/4")}  # of the length: the radius
+COARSEST = 0.1  # of a step's own error: beyond it that of the solution would show
 LONGEST = 500  # segments of the straight rod that drag is matched to: more would be a long wait
 
 
@@ -163,10 +164,21 @@ def _time(case: Scene) -> Iterator[Fault]:
             '1, or scheme = "implicit"',
             ("time.scheme", "thermal"),
         )
+    if time.solver_error is not None:
+        yield from _solver_error(time)
     if time.step != "auto" and time.step < time.shortest:
         default = ", by default 1e-12 of time.end" if time.min_step is None else ""
         allowed = f"at least min_step = {time.shortest:g}{default}"
         yield Fault("time.step", f"{time.step:g}", allowed, ("time.min_step", "time.end"))
+
+
+def _solver_error(time: Time) -> Iterator[Fault]:
+    """It is measured by what extrapolation was off by, as implicit steps of second order have it."""
+    key, reads = "time.solver_error", ("time.scheme", "time.order", "thermal")
+    if time.scheme != "implicit" or time.order != 2:
+        yield Fault(key, f'it with scheme = "{time.scheme}", order = {time.order}', "implicit steps of order 2", reads)
+    elif time.solver_error is not None and time.solver_error > COARSEST:
+        yield Fault(key, f"{time.solver_error:g}", f"at most {COARSEST:g}")
 
 
 def _output(case: Scene) -> Iterator[Fault]:
