@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .lapack import dgetrf, dgetrs
 
 _WORST = 1e-6  # relative error above which a solution at the floor of its arithmetic is none

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..linalg.compiled import njit
 
 FINE = 0.1  # of the distance: how near to each other the points of a curve are that are looked at
 _FOLDED = 64  # cells a side

@@ -18,7 +18,7 @@ README = re.compile(r"(\]\([^)\s]*?)README\.md")
 SOURCE = re.compile(r"(\]\([^)\s]*?)([\w-]+)\.py\)")
 LISTED = re.compile(r"^- `([\w-]+)\.py`:", re.MULTILINE)
 # The packages in the parts of the side bar, in the order that `ibfil/__init__.py` has them.
-METHOD = ("linalg", "grid", "rods", "bodies", "fluids", "timestepping")
+METHOD = ("linalg", "grid", "rods", "bodies", "fluids", "parallel", "timestepping")
 SCENE = ("case", "io", "observables", "shapes", "assembly", "simulation", "check", "running")
 RESULTS = ("analysis", "visualization", "bench", "studies", "commands")
 

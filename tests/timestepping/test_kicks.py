@@ -16,7 +16,7 @@ from ibfil.case.schema import Case
 from ibfil.check.warnings import warnings
 from ibfil.errors import CaseError, RunFailed
 from ibfil.linalg.constraints import Prescribed
-from ibfil.simulation import thermal_step
+from ibfil.simulation import thermal_step, timescales
 from ibfil.simulation.simulation import Simulation
 from ibfil.timestepping.kicks import Trials
 
@@ -106,7 +106,7 @@ def test_automatic_steps_keep_kicks_small():
         Simulation(scene({"rod": {**ROD, "stretching": ea}}, energy, time={"step": "auto"}))
         for energy, ea in ((1e-8, 2e2), (0.1, 2e3), (0.02, 2e4))
     )
-    assert cold.step_length == pytest.approx(cold.bending_time() / 25)
+    assert cold.step_length == pytest.approx(timescales.slowest_bending(cold.model) / 25)
     for simulation, decides in ((hot, "turn"), (stiff, "ringing")):
         limit = {"turn": thermal_step.TURN, "ringing": thermal_step.RINGING}[decides]
         assert getattr(kicks_of(simulation), decides) == pytest.approx(limit, rel=0.5)
