@@ -72,6 +72,7 @@ function rates() {
 
 function bar() {
   const q = run.quantities[state.quantity], last = q.map.length - 1, ends = scales[state.quantity];
+  if (q.values !== null && !ends) { draw(); return; } // no picture of this scene has come that has a finite value
   part("bar").style.background = "linear-gradient(to right," + q.map.map((c, k) => "rgb(" + c + ") " + (100 * k) / Math.max(last, 1) + "%").join(",") + ")";
   part("low").textContent = q.values === null ? q.low : Number(ends[0].toPrecision(3));
   part("high").textContent = q.values === null ? q.high : Number(ends[1].toPrecision(3));
