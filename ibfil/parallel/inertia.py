@@ -33,7 +33,6 @@ class InertialPart(GridPart):
         viscosity: float,
     ) -> None:
         super().__init__(comm, box, cells, vectors, threads, FIELDS, number)
-        self._comm = comm
         self.history = History(self.grid, density, viscosity, number, self.rows)
         self._background: list[np.ndarray] = []  # of each of its parts, velocity and vorticity
         self._sum: np.ndarray | None = None
