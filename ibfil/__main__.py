@@ -1,7 +1,8 @@
-"""``python -m ibfil`` is the command ``ibfil``."""
+"""``python -m ibfil`` is the command ``ibfil``; workers of MPI executors load this file, too, by another name."""
 
 import sys
 
 from ibfil.commands.main import main
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

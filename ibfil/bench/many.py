@@ -100,7 +100,7 @@ def measure(case: Case, steps: int) -> dict[str, float | str]:
 def measured(count: int, nodes: int, cells: int, steps: int, kind: str = "thrown") -> dict:
     """The same by a process of its own, of swimmers ``thrown`` into a box or of a ``suspension``."""
     words = [sys.executable, "-m", "ibfil.bench.many", *map(str, (count, nodes, cells, steps)), kind]
-    return json.loads(subprocess.run(words, capture_output=True, check=True, text=True).stdout)
+    return json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True, text=True).stdout)
 
 
 def main(words: list[str]) -> None:

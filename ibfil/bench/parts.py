@@ -104,7 +104,7 @@ def main(json: bool = False, parts: Sequence[str] = ()) -> int:
     """Measures the parts asked for and prints a table, or JSON. Returns 0: a busy machine is no failure.
 
     The usual ones, where none is named, take a minute or two; "large" needs 1 GiB, "many" some ten minutes and 2 GiB,
-    "members" some three minutes, "million" half an hour.
+    "members" some three minutes. "million" was never run to its end (README.md): 8 GB or more, half an hour by counts.
     Raises CaseError for a part there is not.
     """
     for part in set(parts) - set(PARTS):

@@ -176,7 +176,7 @@ def measured(cells: int = CELLS, turns: int = TURNS) -> list[Row]:
     if mpiexec is None or find_spec("mpi4py") is None:
         raise CaseError(["bench mpi: found no mpiexec, or no mpi4py; install them: pip install 'ibfil[mpi]' mpich"])
     words = [mpiexec, "-n", "2", sys.executable, "-m", "ibfil.bench.processes", str(cells), str(turns)]
-    answer = subprocess.run(words, capture_output=True, check=True, text=True).stdout
+    answer = subprocess.run(words, stdout=subprocess.PIPE, check=True, text=True).stdout
     return [Row(**row) for row in json.loads(answer)]
 
 

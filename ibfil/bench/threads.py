@@ -59,7 +59,7 @@ def measured() -> list[dict]:
     others = [subprocess.Popen(busy) for _ in range(max(1, (os.cpu_count() or 2) - 1))]
     try:
         words = [sys.executable, "-m", "ibfil.bench.threads"]
-        return json.loads(subprocess.run(words, capture_output=True, check=True, text=True).stdout)
+        return json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True, text=True).stdout)
     finally:
         for process in others:
             process.kill()

@@ -13,8 +13,8 @@ NAME, HELP = "bench", "time the pieces of a step against floors measured in the 
 def add(command: argparse.ArgumentParser) -> None:
     """Add its arguments."""
     words = (
-        "pieces, swimmer (the usual two), start, spaces, thermal, links, body, studies, large, threads, many, "
-        "members, million, mpi"
+        "pieces, swimmer (the usual two), start, spaces, thermal, links, body, studies, large (1 GiB), "
+        "threads, many (10 minutes, 2 GiB), members (3 minutes), mpi; million (never run to its end: 8 GB or more)"
     )
     command.add_argument("parts", nargs="*", metavar="PART", help=words)
     command.add_argument("--json", action="store_true", help="as JSON")

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import CaseError, Interrupted, RunFailed
+from ..parallel.launch import refuse_copies
 from ..screen import let_go, lost, prepare, warn
 from ..version import __version__
 from . import bench, cases, check, live, new, page, render, run, schema, show, verify, vtk, warm
@@ -38,6 +39,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _say([f"command line: found {strange[0]}, whose bytes are not UTF-8; allowed: UTF-8"], BAD_INPUT)
     arguments = parse(words)
     try:
+        if not _of_many(arguments):
+            refuse_copies(arguments.command)
         status: int = arguments.do(arguments)
         return status if not lost() else _say([f"standard output cannot be written ({lost()})"], status or FAILED)
     except BrokenPipeError:
@@ -77,6 +80,11 @@ def parse(argv: list[str]) -> argparse.Namespace:
     return arguments
 
 
+def _of_many(arguments: argparse.Namespace) -> bool:
+    """Whether several processes may do it together: they share a run, and have each its own index of a sweep."""
+    return arguments.do is run.do or getattr(arguments, "index", None) is not None
+
+
 class _Help(argparse.HelpFormatter):
     """Help that takes names like CASE [KEY=VALUE ...] as they are: argparse would write them twice."""
 
@@ -100,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
         command = commands.add_parser(
             module.NAME, help=module.HELP, description=module.HELP, epilog=None, formatter_class=_Help
         )
-        command.set_defaults(do=module.do)
+        command.set_defaults(do=module.do, command=module.NAME)
         module.add(command)
     return parser
 

@@ -34,9 +34,10 @@ def do(arguments: argparse.Namespace) -> int:
     if processes() == 1:
         return _do(arguments)
     set_threads(1)  # of numpy's libraries in all processes but 0, which reads its case first
-    from ..parallel.ranks import Ranks, join, serve
+    from ..parallel.ranks import Ranks, agree, join, serve
 
     comm = join()
+    agree(comm, (arguments.words, arguments.output, arguments.force, arguments.resume))
     if comm.rank:
         serve(comm)
         return DONE

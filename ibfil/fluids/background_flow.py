@@ -15,6 +15,20 @@ from .base import Flow, Part
 FIELDS = 6  # that are transformed together: velocity and vorticity
 
 
+def factors_of(parts: Sequence[Part], time: float) -> tuple[float, ...]:
+    """Those of the parts at ``time``."""
+    return tuple(1.0 if part.factor is None else float(part.factor(time)) for part in parts)
+
+
+def combined(factors: Sequence[float], fields: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
+    """The sum of ``fields`` (6, ..), each times its factor, in ``out``: component by component, as memory is slow."""
+    for x in range(FIELDS):
+        np.multiply(fields[0][x], factors[0], out=out[x])
+        for factor, field in zip(factors[1:], fields[1:], strict=True):
+            out[x] += factor * field[x]
+    return out
+
+
 class Background:
     """A maintained flow on the grid, filtered like what it is multiplied with.
 
@@ -38,12 +52,7 @@ class Background:
         if len(self._parts) == 1 and self._parts[0].factor is None:
             return self._fields[0]
         out = np.empty_like(self._fields[0]) if self._known is None else self._known[1]
-        factors = [1.0 if part.factor is None else part.factor(time) for part in self._parts]
-        for x in range(FIELDS):
-            np.multiply(self._fields[0][x], factors[0], out=out[x])
-            for factor, field in zip(factors[1:], self._fields[1:], strict=True):
-                out[x] += factor * field[x]
-        return out
+        return combined(factors_of(self._parts, time), self._fields, out)
 
     def _filtered(self, velocity: np.ndarray) -> np.ndarray:
         """Velocity and vorticity of a velocity at the grid's points (k, 3)."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..fluids.advection import cross, cross_in, filters
-from ..fluids.background_flow import FIELDS
+from ..fluids.background_flow import FIELDS, combined
 from ..fluids.history import History, Weights
 from ..grid.slab_fft import Block
 from ..grid.spectral import curl
@@ -33,7 +33,6 @@ class InertialPart(GridPart):
         viscosity: float,
     ) -> None:
         super().__init__(comm, box, cells, vectors, threads, FIELDS, number)
-        self._comm = comm
         self.history = History(self.grid, density, viscosity, number, self.rows)
         self._background: list[np.ndarray] = []  # of each of its parts, velocity and vorticity
         self._sum: np.ndarray | None = None
@@ -112,12 +111,8 @@ class InertialPart(GridPart):
         if len(self._background) == 1 and factors[0] == 1.0:
             return self._background[0]
         out = np.empty_like(self._background[0]) if self._sum is None else self._sum
-        for x in range(FIELDS):
-            np.multiply(self._background[0][x], factors[0], out=out[x])
-            for factor, field in zip(factors[1:], self._background[1:], strict=True):
-                out[x] += factor * field[x]
-        self._sum = out
-        return out
+        self._sum = combined(factors, self._background, out)
+        return self._sum
 
     def background(self, factors: Sequence[float]) -> np.ndarray | None:
         """The whole of it (6, nx, ny, nz) on process 0."""

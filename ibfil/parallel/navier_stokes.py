@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ..fluids.background_flow import factors_of
 from ..fluids.base import Flow, Part
 from ..fluids.coupling import Nodes
 from ..fluids.history import Weights
@@ -84,7 +85,7 @@ class SharedBackground:
     def factors(self, time: float) -> tuple[float, ...]:
         """Those of the parts at ``time``; where none are known the whole flow is put on the grid for it."""
         if self._parts is not None:
-            return tuple(1.0 if part.factor is None else float(part.factor(time)) for part in self._parts)
+            return factors_of(self._parts, time)
         if self._known != time:
             self._shared.call("maintain", 0, own=(partial(_at, self._flow, time),))
             self._known = time

@@ -32,7 +32,7 @@ class GridPart:
         fields: int = 3,
         number: type = np.float64,
     ) -> None:
-        self.grid, self.vectors = Grid(box, cells), vectors
+        self._comm, self.grid, self.vectors = comm, Grid(box, cells), vectors
         self.transform = SharedTransform(comm, cells, max(fields, 3 * vectors), threads, number)
         self.nodes = SharedNodes(comm, self.transform.planes, cells[0])
         self.rows = self.transform.rows.rows(comm.rank)

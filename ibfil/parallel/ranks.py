@@ -20,7 +20,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..errors import CaseError
 from ..screen import warn
 from . import launch
 
@@ -32,6 +31,10 @@ _MISSING = (
 _STRANGE = (
     "mpiexec: started {count} processes, of which MPI knows {size}: mpi4py was built for another MPI ({library}) than "
     "this mpiexec belongs to; use that one's mpiexec, or pip install --no-binary mpi4py mpi4py"
+)
+_DIFFERENT = (
+    "mpiexec: started {count} processes with different words, and they share one run; give all the same, or start "
+    "each run by itself"
 )
 _STOP, _MAKE, _CALL = range(3)
 _ours: Ranks | None = None
@@ -121,18 +124,18 @@ def join() -> Any:
     try:
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:
-        return _refuse(_MISSING.format(count=count, why=str(error).strip().split("\n")[0]))
+        launch.refuse(_MISSING.format(count=count, why=str(error).strip().split("\n")[0]))
     comm = MPI.COMM_WORLD
     if comm.size != count:
         library = MPI.Get_library_version().split("\n")[0].strip(" \0")
-        return _refuse(_STRANGE.format(count=count, size=comm.size, library=library))
+        launch.refuse(_STRANGE.format(count=count, size=comm.size, library=library))
     return comm
 
 
-def _refuse(line: str) -> NoReturn:
-    if launch.place() == 0:
-        raise CaseError([line])
-    raise SystemExit(0)
+def agree(comm: Any, words: object) -> None:
+    """Raises CaseError, on process 0, where processes were not all asked for the same run."""
+    if any(other != words for other in comm.allgather(words)):
+        launch.refuse(_DIFFERENT.format(count=comm.size))
 
 
 def serve(comm: Any) -> None:

@@ -8,12 +8,16 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
+from ibfil.fluids.coupling import TRANSLATION
+from ibfil.fluids.spaces.periodic import PeriodicSpace
 from ibfil.fluids.stokes import StokesSolve
-from ibfil.fluids.torque_coupling import TorqueStokesSolve
+from ibfil.fluids.torque_coupling import TorqueCoupling, TorqueStokesSolve
 from ibfil.grid.kernels import KERNELS
 from ibfil.grid.periodic_grid import Grid
+from ibfil.parallel import table
 from ibfil.parallel.ranks import Ranks, serve
 from ibfil.parallel.stokes import Placed, SharedStokesSolve, share
+from ibfil.parallel.table import SharedSpace
 
 CELLS = (20, 25, 18)  # none of which 3 divides but the last, which is not shared
 
@@ -33,6 +37,16 @@ def solves(ranks: Ranks) -> None:
                 found = SharedStokesSolve(shared, placed, 1.3, alpha).velocity(*stencil, force)
                 known = alone(grid, 1.3, alpha=alpha).velocity(*stencil, force)
                 print(np.abs(found - known).max() / np.abs(known).max(), hashlib.md5(found.tobytes()).hexdigest())
+
+
+def tables(ranks: Ranks) -> None:
+    """For each coupling, and a fluid with inertia or without, the same of tables."""
+    box = (2.0, 2.5, 1.8)
+    twisted = TorqueCoupling(np.ones(1), np.ones(1))
+    for coupling, alpha in ((TRANSLATION, 0.0), (twisted, 0.0), (twisted, 3.0)):
+        known = PeriodicSpace(box, CELLS).mobility(coupling, 4, 1.3, alpha)._octant.values
+        found = SharedSpace(box, CELLS, ranks).mobility(coupling, 4, 1.3, alpha)._octant.values
+        print(np.abs(found - known).max() / np.abs(known).max(), hashlib.md5(found.tobytes()).hexdigest())
 
 
 class Fails:
@@ -58,4 +72,9 @@ if __name__ == "__main__":
         serve(MPI.COMM_WORLD)
     else:
         with Ranks(MPI.COMM_WORLD) as together:
-            solves(together) if sys.argv[1] == "solves" else fails(together, int(sys.argv[2]))
+            if sys.argv[1] == "solves":
+                solves(together)
+                table.LARGE = 0
+                tables(together)
+            else:
+                fails(together, int(sys.argv[2]))

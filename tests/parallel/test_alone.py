@@ -14,6 +14,7 @@ from parallel.test_shared import INERTIA, STOKES
 
 import ibfil
 from ibfil.case.reading import parse_case
+from ibfil.commands.main import main
 from ibfil.errors import CaseError
 from ibfil.parallel import launch, ranks
 from ibfil.parallel.division import Division
@@ -57,6 +58,34 @@ def test_without_mpi4py_it_is_said_once_what_to_install(tmp_path, rank):
     assert done.stderr == ("" if rank else line + "install them: pip install 'ibfil[mpi]' mpich\n")
     assert done.returncode == (0 if rank else 2)
     assert not list(tmp_path.glob("*.h5"))
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_what_each_process_would_do_all_of_is_refused_once(tmp_path, monkeypatch, capsys, rank):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "4")
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", str(rank))
+    (tmp_path / "stokes.toml").write_text(STOKES)
+    words = ["sweep", "stokes.toml", "--vary", "fluid.viscosity=1,2"]
+    if rank:
+        with pytest.raises(SystemExit, match="0"):
+            main(words)
+    else:
+        assert main(words) == 2
+    line = (
+        "ibfil: sweep: found 4 processes (OMPI_COMM_WORLD_SIZE), each of which would do all of it; allowed: 1 process"
+    )
+    told = capsys.readouterr().err
+    assert told.count("\n") == (0 if rank else 1)
+    assert told.startswith("" if rank else line)
+    assert [path.name for path in tmp_path.iterdir()] == ["stokes.toml"]
+
+
+def test_a_run_that_processes_were_not_all_asked_for_is_refused(monkeypatch):
+    words = (["a.toml"], None, False, None)
+    ranks.agree(SimpleNamespace(size=2, allgather=lambda mine: [mine, words]), words)
+    with pytest.raises(CaseError, match="2 processes with different words"):
+        ranks.agree(SimpleNamespace(size=2, allgather=lambda mine: [mine, (["b.toml"], *words[1:])]), words)
 
 
 def test_the_launcher_is_known_by_its_own_variables(monkeypatch):

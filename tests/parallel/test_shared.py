@@ -88,7 +88,7 @@ def same_to(error: float, one: Path, other: Path, fields: bool = False) -> bool:
 def test_solves_are_those_of_one_process_and_their_bits_do_not_depend_on_how_many_there_are(tmp_path):
     lines = {count: together(count, HERE / "on_processes.py", "solves", folder=tmp_path) for count in (2, 3)}
     errors = [float(line.split()[0]) for line in lines[2].splitlines()]
-    assert len(errors) == 12
+    assert len(errors) == 15
     assert max(errors) < 1e-13
     assert lines[2] == lines[3]
 
@@ -155,3 +155,37 @@ def test_a_run_that_fails_says_so_once_and_ends(tmp_path):
     told = run(2, tmp_path, "case.toml", *explicit, status=1)
     assert told.count("the run stopped at t = ") == 1
     assert told.count("what to change: ") == 1
+
+
+@needs_mpi
+def test_members_of_a_study_go_to_the_workers_of_mpi4py(tmp_path):
+    """As ibfil/studies/README.md has it."""
+    (tmp_path / "case.toml").write_text(STOKES)
+    words = (
+        "-m",
+        "mpi4py.futures",
+        "-m",
+        "ibfil",
+        "sweep",
+        "case.toml",
+        "--vary",
+        "fluid.viscosity=1,2",
+        "-o",
+        "study",
+    )
+    told = together(3, *words, "--executor", "mpi4py.futures:MPIPoolExecutor", "--jobs", "2", folder=tmp_path)
+    assert told.count(": finished in ") == 2
+    assert len(list((tmp_path / "study").glob("*.h5"))) == 2
+
+
+@needs_mpi
+def test_processes_with_a_case_each_are_refused_in_one_line(tmp_path):
+    for name in ("0", "1"):
+        (tmp_path / f"{name}.toml").write_text(STOKES)
+    each = (
+        "import sys; from ibfil.commands.main import main; from ibfil.parallel.launch import place; "
+        "sys.exit(main(['run', f'{place()}.toml']))"
+    )
+    told = together(2, "-c", each, folder=tmp_path, status=2)
+    assert told.count("2 processes with different words") == 1
+    assert not list(tmp_path.glob("*.h5"))

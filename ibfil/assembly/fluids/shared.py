@@ -5,12 +5,12 @@ A model of models.py with what differs: the solver, and a method whose work is t
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ...errors import CaseError
-from ...parallel.ranks import Ranks, ours
+from ...parallel.ranks import ours
+from .. import grid as grids
 from ..flow import flow_parts
 from .navier_stokes import NavierStokesModel
 from .on_grid import GridModel
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ...fluids.base import Fluid
     from ...fluids.immersed_boundary import Immersed
     from ...fluids.stokes import Solver
+    from ...parallel.table import SharedSpace
     from ..stacked import RodStack
     from .base import FluidModel
 
@@ -48,7 +49,24 @@ def _refused(case: Case, why: str) -> CaseError:
     return CaseError([f"{case.file}: {why}: nothing to share; {_ALONE}"])
 
 
-class SharedStokes(StokesModel):
+class SharedGrid(GridModel):
+    """A grid that is shared."""
+
+    @cached_property
+    def space(self) -> SharedSpace:
+        """The periodic box. Raises CaseError where ``thickness`` has no cells, or the grid not one for each process."""
+        from ...parallel.table import SharedSpace
+
+        made, ranks = grids.periodic_space(self.case), ours()
+        assert ranks is not None
+        least = min(made.cells[:2])
+        if ranks.size > least:
+            why = f"{ranks.size} processes share planes of the grid, of which {least} is the least along x and y"
+            raise CaseError([f"{self.case.file}: fluid.cells: {why}; allowed: mpiexec -n {least} at most"])
+        return SharedSpace(made.box, made.cells, ranks)
+
+
+class SharedStokes(SharedGrid, StokesModel):
     """Stokes flow by FFTs of a grid that is shared."""
 
     def method(self, rods: RodStack) -> str:
@@ -72,11 +90,11 @@ class SharedStokes(StokesModel):
         from ...parallel.stokes import Placed, SharedStokesSolve, share
 
         vectors = 2 if self.case.couples_torque else 1
-        shared = share(_all_at_work(self), self.grid, vectors, self.case.compute.threads)
+        shared = share(self.space.ranks, self.grid, vectors, self.case.compute.threads)
         return SharedStokesSolve(shared, Placed(shared), self.case.fluid.viscosity)
 
 
-class SharedNavierStokes(NavierStokesModel):
+class SharedNavierStokes(SharedGrid, NavierStokesModel):
     """Navier-Stokes flow on a grid that is shared; whichever method answers to forces, the fluid's own motion is."""
 
     def fluid(self, rods: RodStack, immersed: Immersed, method: str) -> Fluid:
@@ -84,7 +102,7 @@ class SharedNavierStokes(NavierStokesModel):
         from ...parallel import navier_stokes as shared
         from ...parallel.stokes import SharedStokesSolve
 
-        ranks, threads = _all_at_work(self), self.case.compute.threads
+        ranks, threads = self.space.ranks, self.case.compute.threads
         workspace = shared.SharedWorkspace(ranks, immersed, self.grid, self.density, threads)
         background = None
         if immersed.flow is not None:
@@ -95,13 +113,3 @@ class SharedNavierStokes(NavierStokesModel):
 
         operator = self.operators(rods, immersed, method, solver)
         return shared.SharedNavierStokes(immersed, self.density, operator, workspace, background)
-
-
-def _all_at_work(model: GridModel) -> Ranks:
-    """The processes of this run. Raises CaseError where the grid has not a plane, or a row, for each."""
-    ranks, least = ours(), int(np.min(model.grid.cells[:2]))
-    assert ranks is not None
-    if ranks.size > least:
-        why = f"{ranks.size} processes share planes of the grid, of which {least} is the least along x and y"
-        raise CaseError([f"{model.case.file}: fluid.cells: {why}; allowed: mpiexec -n {least} at most"])
-    return ranks
