@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..assembly.bodies.clouds import path_key
 from ..errors import CaseError
 from ..rods.geometry import Configuration
 from ..timestepping.base import State
@@ -42,6 +43,7 @@ def stored(model: Model, now: SolvedState, control: StepControl, limits: StepLim
         **_under("fluid", model.fluid.memory()),
         **_under("rods", rods.system.memory()),
         **rods.contact.state(),
+        **_under("cloud", _clouds(model)),
         **({"there": now.there.table} if rods.bodies else {}),
         **({"laws": laws} if laws else {}),
     }
@@ -52,7 +54,7 @@ def taken_up(
 ) -> tuple[SolvedState, list[str]]:
     """The present that ``stored`` was given, its memories handed back to those whose they are; and what is to be told.
 
-    Raises CaseError where other laws from Python, or another start shape, were stored.
+    Raises CaseError where other laws from Python, another start shape, or other markers of a body were stored.
     """
     if state.get("laws", "") != laws:
         found, wanted = laws or "none", state.get("laws") or "none"
@@ -61,6 +63,7 @@ def taken_up(
     array = {k: v for k, v in known.items() if isinstance(v, np.ndarray)}
     number = {k: v for k, v in known.items() if not isinstance(v, np.ndarray)}
     _same_start(model, array["start"])
+    _same_clouds(model, _of("cloud", array))
     told = [] if control.restore(_of("control", known)) else [OTHER_STEPS]
     limits.restore(_of("limits", number))
     if memory := _of("fluid", known):
@@ -96,3 +99,18 @@ def _same_start(model: Model, began: np.ndarray) -> None:
             found = f"a start shape that differs by {moved:.3g} from the one the run began with"
             allowed = "the file or run it is read from, as it was"
             raise CaseError([f"{model.case.file}: filament.{name}.shape: found {found}; allowed: {allowed}"])
+
+
+def _clouds(model: Model) -> dict[str, np.ndarray]:
+    """The markers (k, 3) of bodies that have them from a file, by name."""
+    rods = model.rods
+    each = zip(rods.bodies, rods.with_bodies.rows.bodies, strict=True) if rods.bodies else ()
+    return {name: body.cloud for name, body in each if body.cloud is not None}
+
+
+def _same_clouds(model: Model, began: Mapping[str, np.ndarray]) -> None:
+    """A body is what its file says, so the file must be as the run began with."""
+    for name, cloud in _clouds(model).items():
+        if not np.array_equal(cloud, began[name]):
+            found = "found other markers in its file than the run began with"
+            raise CaseError([f"{model.case.file}: {path_key(model.case, name)}: {found}; allowed: the file as it was"])

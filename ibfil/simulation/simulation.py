@@ -289,8 +289,8 @@ class Simulation:
     def restore(self, state: checkpoint.Stored) -> None:
         """Takes up a state that ``state`` gave.
 
-        Raises CaseError where it was made with other laws from Python, or from a start shape that has changed since in
-        the file or run it is read from.
+        Raises CaseError where it was made with other laws from Python, or from a start shape or markers of a body that
+        have changed since in the file or run they are read from.
         """
         now, told = checkpoint.taken_up(self.model, state, self._control, self.limits, self._laws)
         self.state_now, self._iterations = now.state, now.iterations

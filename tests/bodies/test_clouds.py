@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ import ibfil
 from ibfil.analysis.body_meshes import body_surfaces, extents
 from ibfil.analysis.run import open_run
 from ibfil.bodies.resistance import ellipsoid
+from ibfil.case.reading import parse_case
 from ibfil.errors import CaseError
 from ibfil.fluids.shells.calibration import fitted
 from ibfil.simulation.simulation import Simulation
@@ -132,6 +135,29 @@ def test_a_run_records_them_and_draws_them(tmp_path):
     page = write_page(tmp_path / "cell.h5", tmp_path / "cell.html", log=str).read_text()
     assert '"linewords": "crosses: markers"' in page
     assert '"links": 150,' in page
+
+
+COPIES = 'copies = { count = 2, at = [0, "1.5*i", 0] }\n[body.head]'
+
+
+def test_a_run_goes_on_only_with_the_markers_it_began_with(tmp_path):
+    """Bit for bit with the same file; with another the key of the table is told, also of copies."""
+    points = shell()
+    path = written(tmp_path, CLOUD, points).file
+    case = parse_case(Path(path).read_text().replace("[body.head]", COPIES), path)
+    first, again = Simulation(case), Simulation(case)
+    first.advance(0.02, lambda: None)
+    again.restore(first.state())
+    for sim in (first, again):
+        sim.accept(sim.attempt(0.02), 0.04)
+    np.testing.assert_array_equal(again.configuration.table, first.configuration.table)
+    for others in (points[:-1], 0.99 * points):
+        written(tmp_path, CLOUD, others)
+        with pytest.raises(CaseError, match=r"cell\.toml: body\.head\.shape\.path: found other markers in its file"):
+            Simulation(case).restore(first.state())
+    (tmp_path / "markers.csv").unlink()
+    with pytest.raises(CaseError, match=r"cell\.toml: body\.head\.shape\.path: markers\.csv: cannot be read"):
+        Simulation(case)
 
 
 FAULTS = {

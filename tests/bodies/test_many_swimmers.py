@@ -24,6 +24,7 @@ SCENES = {
     "box": (BOX, ""),
     "free": (FREE, BALL),
     "wall": (WALL, ""),
+    "free-slip": (WALL.replace("no-slip", "free-slip"), ""),
     "torques": (FREE + '\nrotation = "grid"', ""),
     "flow": (BOX + FLOW, BALL),
     "link": (BOX, LINK),

@@ -195,3 +195,17 @@ def test_a_scene_moved_as_a_whole_feels_what_it_felt():
     assert np.abs(here.force).max() > 0.1
     assert moved.position == pytest.approx(here.position + shift, abs=1e-12)
     assert moved.force == pytest.approx(here.force, abs=1e-9)
+
+
+def test_a_cloud_of_markers_goes_with_a_scene_moved_as_a_whole(tmp_path):
+    """Also one without a position, which is at the origin: left there it would be elsewhere in its filament's frame."""
+    np.savetxt(tmp_path / "markers.csv", 0.1 * np.eye(4, 3), delimiter=",", header="x,y,z", comments="")
+    ends = '[filament.rod.start]\nend = "body"\nbody = "head"\n'
+    head = '[body.head]\nshape = { kind = "file", path = "markers.csv" }\n'
+    head += "resistance = { translation = [1, 1, 1], rotation = [1, 1, 1] }\n"
+    text, name = rod(17, 1e3, ends=ends) + RFT + until(0.5, 0.02, 0.05) + head, str(tmp_path / "cloud.toml")
+    simulation, shift = Simulation(parse_case(text, name)), np.array([0.01, -0.02, 0.03])
+    there = Simulation(parse_case(simulation.case.text, name, place.moved(simulation, shift)))
+    here, moved = (one.snapshot() for one in (simulation, there))
+    assert moved.filaments["rod"].position == pytest.approx(here.filaments["rod"].position + shift, abs=1e-12)
+    assert moved.bodies["head"].position == pytest.approx(here.bodies["head"].position + shift, abs=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -47,11 +48,20 @@ def attached_ends(rods: RodStack) -> list[InBody]:
     return out
 
 
+def by_body(ends: Sequence[InBody]) -> defaultdict[str, list[InBody]]:
+    """The ends in each body, by its name."""
+    out: defaultdict[str, list[InBody]] = defaultdict(list)
+    for at in ends:
+        out[at.end.body].append(at)
+    return out
+
+
 def check_places(case: Case, rods: RodStack, ends: Sequence[InBody], bodies: Sequence[Body]) -> None:
     """Ends lie on their bodies, or within the size of these; rods do not run through them; a joint can turn one way."""
-    faults, tables, names = [], case.each_body, list(case.each_body)
+    faults, tables, inside = [], case.each_body, by_body(ends)
+    made = dict(zip(tables, bodies, strict=True))
     for at in ends:
-        body, table = bodies[names.index(at.end.body)], tables[at.end.body]
+        body, table = made[at.end.body], tables[at.end.body]
         key = f"{case.file}: filament.{at.filament}.{'finish' if at.finish else 'start'}.body"
         if body.cloud is None:
             length = rods.filaments[rods.names.index(at.filament)].length
@@ -60,8 +70,7 @@ def check_places(case: Case, rods: RodStack, ends: Sequence[InBody], bodies: Seq
             fault = _away(at, body, body.cloud, rods.start)
         faults += [f"{key}: {fault.format(name=at.end.body)}"] if fault else []
     for name, table in tables.items():
-        own = [at for at in ends if at.end.body == name]
-        if not size(case, name, table).any() and _in_line(own, rods.start):
+        if not size(case, name, table).any() and _in_line(inside[name], rods.start):
             found = "found clamped filaments without twisting that leave a joint along one line, and may turn about it"
             faults.append(f"{case.file}: body.{name}: {found}; allowed: twisting, or hinged ends")
     if faults:

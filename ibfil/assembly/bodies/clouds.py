@@ -26,7 +26,13 @@ def cloud(case: Case, name: str, body: Body) -> np.ndarray | None:
     try:
         return _read(Path(case.file).parent / path)
     except ValueError as error:
-        raise CaseError([f"{case.file}: body.{name}.shape.path: {path}: {error}"]) from None
+        raise CaseError([f"{case.file}: {path_key(case, name)}: {path}: {error}"]) from None
+
+
+def path_key(case: Case, name: str) -> str:
+    """The key of the file of a body's markers; of a copy that of the body it is of."""
+    table = case.each_body[name]
+    return next(f"body.{own}.shape.path" for own, body in case.bodies.items() if body is table)
 
 
 def size(case: Case, name: str, body: Body) -> np.ndarray:

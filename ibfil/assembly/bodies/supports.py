@@ -25,14 +25,18 @@ def supports(rods: RodStack, ends: Sequence[InBody], names: Sequence[str]) -> Su
         bodies = [found[k][0].body for k in numbers if found[k][0].body >= 0]
         for other in bodies[1:]:
             group = [group[bodies[0]] if g == group[other] else g for g in group]
+    together: dict[int, tuple[list[int], list[list[int]]]] = {}  # bodies, and the supports of each of their rods
+    for b, g in enumerate(group):
+        together.setdefault(g, ([], []))[0].append(b)
+    for numbers in rods_of.values():
+        body = max(found[k][0].body for k in numbers)  # one at least: all of them are in one group
+        together[group[body]][1].append(numbers)
     components: list[tuple[tuple[int, ...], tuple[int, ...], np.ndarray]] = []
-    for g in dict.fromkeys(group):
-        of_group = tuple(b for b in range(len(names)) if group[b] == g)
-        own = [numbers for numbers in rods_of.values() if any(found[k][0].body in of_group for k in numbers)]
+    for of_group, own in together.values():
         mine = tuple(k for numbers in own for k in numbers)
         if len(of_group) > 1 or any(found[k][0].body < 0 for k in mine):
             where = [rods.nodes[found[numbers[0]][1]] for numbers in own]
-            components.append((of_group, mine, np.concatenate([np.arange(w.start, w.stop) for w in where])))
+            components.append((tuple(of_group), mine, np.concatenate([np.arange(w.start, w.stop) for w in where])))
     used = [k for _, mine, _ in components for k in mine]
     if not used:
         return None

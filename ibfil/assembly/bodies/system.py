@@ -13,7 +13,7 @@ from ...bodies.system import RodsWithBodies
 from ...case.table import ORIGIN
 from ...rods.boundary_conditions import spinning, steady, turned
 from ..loads import number, triple
-from .attached import InBody, attached_ends, check_places
+from .attached import InBody, attached_ends, by_body, check_places
 from .clouds import cloud, size
 from .supports import supports
 
@@ -38,8 +38,8 @@ def with_bodies(case: Case, rods: RodStack) -> RodStack:
 def _system(case: Case, rods: RodStack) -> RodsWithBodies:
     """The system of the rods and the bodies."""
     begin, each, ends = rods.start, case.each_body, attached_ends(rods)
-    names = list(each)
-    bodies = [_body(case, name, table, [e for e in ends if e.end.body == name], begin) for name, table in each.items()]
+    names, inside = list(each), by_body(ends)
+    bodies = [_body(case, name, table, inside[name], begin) for name, table in each.items()]
     check_places(case, rods, ends, bodies)
     motors: list[Motor] = []
     driven, attachments = [], []
@@ -51,7 +51,7 @@ def _system(case: Case, rods: RodStack) -> RodsWithBodies:
             motors.append(_motor(at.end.motor, number_of, body, begin, at))
             driven.append(np.arange(at.where.start, at.where.stop))
         attachments.append(_attachment(at, number_of, motor, body, begin, rods.system.unknowns))
-    parts = [[np.arange(e.where.start, e.where.stop) for e in ends if e.end.body == name] for name in names]
+    parts = [[np.arange(e.where.start, e.where.stop) for e in inside[name]] for name in names]
     own = [np.unique(np.concatenate([np.zeros(0, np.int64), *some])) for some in parts]
     found = supports(rods, ends, names)
     together = [own[b] for b in range(len(own))] if found is None else found.together(own)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import CaseError
-from ..bodies.clouds import cloud, size
+from ..bodies.clouds import cloud, path_key, size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -120,7 +120,7 @@ def _in_the_way(case: Case, rods: RodStack, placed: list[np.ndarray], h: float) 
         nearest = apart(points).min(initial=np.inf) / h
         if tables[name].shape.file is not None and nearest < NEAREST:
             found = f"found markers {nearest:.2g} cells apart, which lock against each other"
-            yield f"body.{name}.shape.path: {found}; allowed: {NEAREST:g} cells or more"
+            yield f"{path_key(case, name)}: {found}; allowed: {NEAREST:g} cells or more"
         for filament, where in zip(rods.names, rods.nodes, strict=True):
             away = _distance(points, nodes[where]) / h
             if away < NEAREST:

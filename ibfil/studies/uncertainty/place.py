@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...case.link import Spring
+from ...case.table import ORIGIN
 from ...errors import CaseError
 
 if TYPE_CHECKING:
@@ -63,8 +64,9 @@ def _tied(case: Case, shift: np.ndarray) -> Iterator[str]:
         if isinstance(link, Spring) and any(site.point is not None for site in link.between):
             yield f"link.{name}.between=[{', '.join(_site(site, shift) for site in link.between)}]"
     for name, body in case.bodies.items():
-        if body.position is not None and name in case.each_body:  # copies go with their filaments
-            yield f"body.{name}.position={[float(x) for x in np.array(body.position) + shift]}"
+        follows = body.position is None and body.shape.file is None  # its first end, without a key
+        if not follows and name in case.each_body:  # copies go with their filaments
+            yield f"body.{name}.position={[float(x) for x in np.array(body.position or ORIGIN) + shift]}"
     for name, filament in case.filaments.items():
         for side, end in (("start", filament.start), ("finish", filament.finish)):
             if end.spring is not None:
