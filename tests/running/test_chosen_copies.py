@@ -96,6 +96,27 @@ def test_such_a_run_goes_on_to_the_same_bits(tmp_path):
             assert np.array_equal(column, other.observables[name])
 
 
+@pytest.mark.parametrize(
+    "other", ["copies_every=1", "copies_every=6", "probes=[[0.1,0,0]]", "grid_stride=2", "fields=['vorticity']"]
+)
+def test_no_run_goes_on_with_other_datasets(tmp_path, other):
+    path, key = tmp_path / "part.h5", "output." + other.partition("=")[0]
+    made(path, *SOME, "output.grid_every=0.1", "time.end=0.1")
+    before = path.read_bytes()
+    with pytest.raises(CaseError, match=rf"{key}\S*: found .* only time.end and times of output may change"):
+        resume_run(path, case(*SOME, "output.grid_every=0.1", f"output.{other}"), progress=False)
+    assert path.read_bytes() == before
+
+
+def test_a_run_may_go_on_with_fields_where_it_had_none(tmp_path):
+    path, fields = tmp_path / "part.h5", ("output.grid_every=0.1", "output.fields=['vorticity']")
+    made(path, *SOME, "time.end=0.1")
+    resume_run(path, case(*SOME, *fields), progress=False, log=lambda line: None)
+    with RunFile(path) as run_file:
+        assert np.asarray(run_file.grid.time) == pytest.approx([0.1, 0.2])
+        assert list(run_file.grid.fields) == ["vorticity"]
+
+
 def test_no_flow_is_made_of_forces_that_are_not_there(tmp_path):
     made(tmp_path / "some.h5", *SOME)
     with RunFile(tmp_path / "some.h5") as some, pytest.raises(CaseError, match=r"copies_every leaves forces out"):
