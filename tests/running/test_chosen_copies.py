@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ibfil.analysis import summary
 from ibfil.analysis.flow import flow_of
 from ibfil.analysis.run import Run
 from ibfil.case.reading import parse_case
@@ -115,6 +116,12 @@ def test_a_run_may_go_on_with_fields_where_it_had_none(tmp_path):
     with RunFile(path) as run_file:
         assert np.asarray(run_file.grid.time) == pytest.approx([0.1, 0.2])
         assert list(run_file.grid.fields) == ["vorticity"]
+
+
+def test_a_digest_tells_that_copies_are_missing(tmp_path):
+    told = summary.as_text(summary.digest(made(tmp_path / "some.h5", *SOME)))
+    assert "rod_006 (9 nodes); of copies one in 3 is written, and observed (output.copies_every)" in told
+    assert "copies_every" not in summary.as_text(summary.digest(made(tmp_path / "whole.h5")))
 
 
 def test_no_flow_is_made_of_forces_that_are_not_there(tmp_path):
