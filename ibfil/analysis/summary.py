@@ -42,6 +42,7 @@ def digest(run: RunFile) -> dict[str, Any]:
         "method": run.method,
         "groups": run.groups,
         "filaments": {name: columns["position"].shape[1] for name, columns in run.filaments.items()},
+        "copies_every": case.output.copies_every if any(f.copies for f in case.filaments.values()) else 1,
         "fields": {} if run.grid is None else {name: len(column) for name, column in run.grid.fields.items()},
         "observables": {name: _observed(run, name, observables[name], found[name]) for name in observables}
         | {name: _last(run, name) for name in run.observables if name in extra},
@@ -102,6 +103,8 @@ def as_text(told: Mapping[str, Any]) -> str:
     unit = "" if told["units"]["time"] == "1" else " " + told["units"]["time"]
     end = f", until {told['finished']}" if told["finished"] else ""
     nodes = listed([f"{name} ({count} nodes)" for name, count in told["filaments"].items()])
+    every = told["copies_every"]
+    some = f"; of copies one in {every} is written, and observed (output.copies_every)" if every > 1 else ""
     start, stop = told["time"]
     about = [
         ("run", f"{told['file']}: {told['status']}" + (f" ({told['reason']})" if told["reason"] else "")),
@@ -110,7 +113,7 @@ def as_text(told: Mapping[str, Any]) -> str:
         ("steps", f"{told['steps']} in {duration(told['wall_time'])}"),
         ("fluid", f"{told['fluid']}, method {told['method']}"),
         ("groups", "  ".join(f"{name} = {value:.4g}" for name, value in told["groups"].items()) or "none"),
-        ("filaments", nodes),
+        ("filaments", nodes + some),
         ("fields", ", ".join(f"{name} at {count} times" for name, count in told["fields"].items()) or "none"),
         ("versions", ", ".join(f"{name} {version}" for name, version in told["versions"].items())),
     ]

@@ -42,8 +42,7 @@ def report(case: Case) -> str:
     parts += _section("share of a step and of memory, from counts", share_lines(simulation))
     parts += _section("size and cost", _costs(simulation))
     parts += _section("step", _steps(simulation))
-    idle = idle_keys(case)
-    if idle:
+    if idle := idle_keys(case):
         parts += _section("idle keys (checked; not used by this fluid)", [", ".join(idle)])
     parts += _section("warnings", warnings(simulation) or ["none"])
     return "\n".join(parts).rstrip()
@@ -220,6 +219,8 @@ def _steps(simulation: Simulation) -> list[str]:
     elif case.time.automatic:
         length = f"dt = {simulation.step_length:.4g} (automatic: {choice.reason})"
     lines = [f"{scheme}, order {case.time.order}: {length}"]
+    if case.time.solver_error is not None:
+        lines.append(f"  solved to {case.time.solver_error:g} of what extrapolation was off by (time.solver_error)")
     if case.time.automatic and case.time.tolerance is None:
         lines += _automatic(simulation)
     if case.time.explicit and simulation.model.fluid is not simulation.model.inner:
@@ -267,8 +268,7 @@ def _automatic(simulation: Simulation) -> list[str]:
 
 def _driven(simulation: Simulation) -> list[str]:
     """The period of what drives, its fastest change, its jumps."""
-    drivers, load = simulation.drivers, simulation.load_rate
-    lines = []
+    lines, drivers, load = [], simulation.drivers, simulation.load_rate
     if drivers.windows:
         period = drivers.period
         repeats = "never repeats itself"

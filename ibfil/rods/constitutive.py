@@ -84,6 +84,7 @@ def gather(parts: Sequence[tuple[slice, Callable, np.ndarray]], configuration: t
         nonlocal known, out
         if t == known:
             return out
+        known = np.nan  # a function may fail half way
         if len(parts) == 1:
             out = parts[0][1](parts[0][2], t)
         else:

@@ -118,9 +118,7 @@ def stencils(mesh: Mesh) -> Stencils:
     """The mesh's stencils, three by three."""
     n, p = mesh.w1.shape
     every, first = np.arange(n), mesh.first
-    joined = np.concatenate(
-        [[False], mesh.joined[: n - 1], [False]]
-    )  # each node with the one before, the last with none
+    joined = np.concatenate([[False], mesh.joined[: n - 1], [False]])  # each node with the one before, and n with none
     beside = [(k, np.nonzero(there)[0]) for k, there in ((-1, joined[:-1]), (0, every >= 0), (1, joined[1:]))]
     start, end = first.copy(), first.copy()
     for k, i in beside:

@@ -35,6 +35,11 @@ if TYPE_CHECKING:
     Build = Callable[[Case, str], Simulation]
     Look = Callable[[Simulation], Overview]
 
+# Keys that may differ where a run goes on: each dataset has a row an output, of one shape, from the first to the last.
+# Those of fields may before there are any.
+_TIMES = ("time.end", *(f"output.{key}" for key in ("every", "times", "grid_every", "checkpoint_every")))
+_OF_FIELDS = tuple(f"output.{key}" for key in ("fields", "grid_stride", "window", "window_at"))
+
 
 def run(
     case: Source,
@@ -100,9 +105,10 @@ def resume_run(
     """Go on with the run in ``path`` from its last checkpoint, bit for bit as if it had never been cut.
 
     One that is finished is made longer, to a later time.end, as if that had been asked for at first. The case is the
-    one it began with, or ``case``, or that with ``overrides``: only time.end and output may differ. The run file is cut
-    back to the checkpoint; a torn one is put right, and one damaged beyond that is computed again. ``laws`` made in
-    Python have to be given again. Raises as `run`, and RunFileError (a CaseError) where there is nothing to go on from.
+    one it began with, or ``case``, or that with ``overrides``: only time.end and the times of outputs may differ. The
+    run file is cut back to the checkpoint; a torn one is put right, and one damaged beyond that is computed again.
+    ``laws`` made in Python have to be given again. Raises as `run`, and RunFileError (a CaseError) where there is
+    nothing to go on from.
     """
     path, build = Path(path), build or _builder(laws)
     if is_being_written(journal_path(path)):
@@ -188,12 +194,13 @@ def _last_checkpoint(path: Path) -> checkpoint.Checkpoint:
 
 
 def _goes_on(path: Path, began: Case, case: Case, last: checkpoint.Checkpoint) -> Case:
-    """The case to go on with. Raises CaseError where more than time.end and output differs, or nothing is to do."""
+    """The case to go on with. Raises CaseError where more than its times differs, or nothing is to do."""
+    may = _TIMES if began.output.grid_every else (*_TIMES, *_OF_FIELDS)
     faults = [
-        f"{case.file}: {key}: found {written(now)}; the run began with {written(then)}, and only time.end and output "
-        'may change: go on without that, or begin a new run (shape.kind = "run" starts from a frame of this one)'
+        f"{case.file}: {key}: found {written(now)}; the run began with {written(then)}, and only time.end and times of "
+        'output may change: go on without that, or begin a new run (shape.kind = "run" starts from a frame of this one)'
         for key, (then, now) in differences(began, case).items()
-        if key != "time.end" and key.split(".")[0] != "output"
+        if ".".join(key.split(".")[:2]) not in may
     ]
     if case.time.end < last.time:
         allowed = f"at least {last.time:g}, where the run is"

@@ -70,7 +70,7 @@ def _cells(widths: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _cell(x, cells, width):
+def _cell(x, width):
     """The cell (3,) of a point, before it is folded back into the box."""
     return int(np.floor(x[0] / width[0])), int(np.floor(x[1] / width[1])), int(np.floor(x[2] / width[2]))
 
@@ -85,7 +85,7 @@ def _at(i, j, k, cells):
 def _met(points, cells, width, box, last, known, before, owner, least):
     """A curve that has a point nearer than ``least`` to one of ``points``; -1 where none has."""
     for q in range(len(points)):
-        i, j, k = _cell(points[q], cells, width)
+        i, j, k = _cell(points[q], width)
         for a in range(i - 1, i + 2):
             for b in range(j - 1, j + 2):
                 for c in range(k - 1, k + 2):
@@ -107,7 +107,7 @@ def _met(points, cells, width, box, last, known, before, owner, least):
 def _keep(points, cells, width, last, known, before, owner, count, curve):
     """Puts the points of a curve after the ``count`` that are there."""
     for q in range(len(points)):
-        i, j, k = _cell(points[q], cells, width)
+        i, j, k = _cell(points[q], width)
         at, p = _at(i, j, k, cells), count + q
         known[p], before[p], owner[p], last[at] = points[q], last[at], curve, p
 

@@ -67,3 +67,9 @@ def test_what_a_run_refuses_a_check_refuses(table):
             do(parse_case(BENT, "bent.toml", ['observe.p={kind="position"}', table]))
         told.append(refused.value.faults)
     assert told[0] == told[1]
+
+
+def test_a_looser_solution_of_steps_is_told():
+    told, whole = (report(parse_case(BENT, "bent.toml", keys)) for keys in (["time.solver_error=0.01"], []))
+    assert "solved to 0.01 of what extrapolation was off by (time.solver_error)" in told
+    assert "solver_error" not in whole

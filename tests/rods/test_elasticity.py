@@ -233,6 +233,20 @@ def test_a_field_is_gathered_from_one_function_a_filament() -> None:
     assert np.array_equal(gather(parts[:1], (5,))(2.0), s + 2)
 
 
+def test_a_field_is_right_at_a_time_after_another_one_had_no_value() -> None:
+    def refused(s, t):
+        if t > 1:
+            raise ValueError("none")
+        return s * t
+
+    s = np.linspace(0, 1, 5)
+    values = gather([(slice(0, 5), lambda s, t: s + t, s), (slice(5, 10), refused, s)], (10,))
+    before = values(1.0).copy()
+    with pytest.raises(ValueError, match="none"):
+        values(2.0)
+    assert np.array_equal(values(1.0), before)
+
+
 def test_a_stack_of_even_rods_has_the_spring_constants_of_each() -> None:
     """Rest lengths come from each filament's own spacing."""
     short, long = np.linspace(0, 1, 9), np.linspace(0, 4, 9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ibfil.analysis import summary
 from ibfil.analysis.flow import flow_of
 from ibfil.analysis.run import Run
 from ibfil.case.reading import parse_case
@@ -94,6 +95,33 @@ def test_such_a_run_goes_on_to_the_same_bits(tmp_path):
         assert np.array_equal(one.position("rod_006"), other.position("rod_006"))
         for name, column in one.observables.items():
             assert np.array_equal(column, other.observables[name])
+
+
+@pytest.mark.parametrize(
+    "other", ["copies_every=1", "copies_every=6", "probes=[[0.1,0,0]]", "grid_stride=2", "fields=['vorticity']"]
+)
+def test_no_run_goes_on_with_other_datasets(tmp_path, other):
+    path, key = tmp_path / "part.h5", "output." + other.partition("=")[0]
+    made(path, *SOME, "output.grid_every=0.1", "time.end=0.1")
+    before = path.read_bytes()
+    with pytest.raises(CaseError, match=rf"{key}\S*: found .* only time.end and times of output may change"):
+        resume_run(path, case(*SOME, "output.grid_every=0.1", f"output.{other}"), progress=False)
+    assert path.read_bytes() == before
+
+
+def test_a_run_may_go_on_with_fields_where_it_had_none(tmp_path):
+    path, fields = tmp_path / "part.h5", ("output.grid_every=0.1", "output.fields=['vorticity']")
+    made(path, *SOME, "time.end=0.1")
+    resume_run(path, case(*SOME, *fields), progress=False, log=lambda line: None)
+    with RunFile(path) as run_file:
+        assert np.asarray(run_file.grid.time) == pytest.approx([0.1, 0.2])
+        assert list(run_file.grid.fields) == ["vorticity"]
+
+
+def test_a_digest_tells_that_copies_are_missing(tmp_path):
+    told = summary.as_text(summary.digest(made(tmp_path / "some.h5", *SOME)))
+    assert "rod_006 (9 nodes); of copies one in 3 is written, and observed (output.copies_every)" in told
+    assert "copies_every" not in summary.as_text(summary.digest(made(tmp_path / "whole.h5")))
 
 
 def test_no_flow_is_made_of_forces_that_are_not_there(tmp_path):

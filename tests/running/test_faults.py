@@ -136,4 +136,4 @@ def test_a_changed_case_is_refused_with_what_has_changed(path, capsys):
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 2
     assert "filament.rod.position.1: found 1.0; the run began with 0.0" in told[1]
-    assert "filament.rod.bending.1: found 2 + s; the run began with 1, and only time.end and output may" in told[0]
+    assert "filament.rod.bending.1: found 2 + s; the run began with 1, and only time.end and times of" in told[0]

@@ -150,7 +150,7 @@ def test_another_scene_is_refused_with_its_keys(path):
         go_on(path, None, ["fluid.viscosity=2", "time.step=0.004", "time.end=3", "filament.rod.length=2"])
     told = "\n".join(caught.value.faults)
     assert len(caught.value.faults) == 3
-    assert "fluid.viscosity: found 2.0; the run began with 1.0, and only time.end and output may change" in told
+    assert "fluid.viscosity: found 2.0; the run began with 1.0, and only time.end and times of output may" in told
     assert all(key in told for key in ("fluid.viscosity", "time.step", "filament.rod.length"))
     with pytest.raises(CaseError, match=r"fluid\.viscosity"):
         go_on(path, case("", "fluid.viscosity=2"))
