@@ -178,6 +178,7 @@ def test_a_new_value_begins_again_and_its_case_is_what_runs():
         ({"key": "fluid.viscosty=2"}, "fluid.viscosty: found an unknown key"),
         ({"key": "time.end=__import__('os').system('touch owned')"}, "time.end: found"),
         ({"set": {"filament.rod.nodes": [1]}}, "filament.rod.nodes: found [1]"),
+        ({"set": {"title": json.loads("[" * 900 + "]" * 900)}}, "maximum recursion depth"),
     ],
 )
 def test_a_bad_value_is_a_line_and_the_run_goes_on_as_it_was(order, told, tmp_path, monkeypatch):
@@ -201,7 +202,7 @@ def test_a_run_that_fails_says_so_and_another_value_begins_again():
 
 
 def test_strange_orders_do_nothing():
-    strange = [{"set": 3}, {"pace": "x"}, {"pace": -1}, {"run": 1}, {"key": 7}, {"again": 0}, {}]
+    strange = [{"set": 3}, {"pace": "x"}, {"pace": -1}, {"pace": 10**400}, {"run": 1}, {"key": 7}, {"again": 0}, {}]
     page = play(bent(), *strange)
     assert page.of("ended") == ["finished"]
     assert len(page.of("scene")) == 1
