@@ -111,6 +111,55 @@ def test_a_picture_has_places_strokes_and_quantities_of_the_present():
     np.testing.assert_allclose(numbers[3 * n + 6 * strokes :].reshape(len(names), n)[0], speed, rtol=1e-5)
 
 
+HEADS = """
+[filament.tail]
+length = 0.8
+nodes = 9
+bending = 1.0
+twisting = 1.0
+stretching = 1e3
+radius = 0.02
+position = [0.4, 0, 0]
+anchor = "start"
+start = { end = "body", body = "head" }
+copies = { count = 5, at = [0.4, "0.7*i - 1.4", 0] }
+[body.head]
+shape = { kind = "file", path = "markers.csv" }
+position = [0, 0, 0]
+[fluid]
+model = "stokes"
+box = [4, 4, 4]
+cells = [40, 40, 40]
+viscosity = 1.3
+[time]
+end = 0.06
+step = 0.02
+[output]
+every = 0.02
+copies_every = 2
+"""
+
+
+def test_of_copies_with_heads_of_markers_those_that_are_written_are_shown_with_all_heads(tmp_path):
+    markers = np.array([[0.2, 0, 0], [-0.2, 0, 0], [0, 0.2, 0], [0, -0.2, 0], [0, 0, 0.2], [0, 0, -0.2]])
+    np.savetxt(tmp_path / "markers.csv", markers, delimiter=",", header="x,y,z", comments="")
+    (tmp_path / "heads.toml").write_text(HEADS)
+    played = Played(ibfil.read_case(tmp_path / "heads.toml"), "tension")
+    facts = played.scene()
+    assert facts["counts"] == [9, 9, 9]
+    assert facts["quantities"][-1]["low"] == "tail_000"
+    assert facts["quantities"][-1]["high"] == "tail_004"
+    numbers = np.frombuffer(played.picture()[16:], "<f4")
+    places, crosses = numbers[:81].reshape(3, 9, 3), numbers[81 : 81 + 6 * facts["links"]].reshape(-1, 2, 3)
+    np.testing.assert_allclose(places[:, 0], [[0.4, 1.4 * k - 1.4, 0] for k in range(3)], atol=1e-6)
+    middles = crosses.mean(axis=1).reshape(5, 3, 6, 3)
+    for copy, arms in enumerate(middles):
+        np.testing.assert_allclose(arms, [markers + np.array([0, 0.7 * copy - 1.4, 0])] * 3, atol=1e-6)
+    while not played.done:
+        played.go_on(lambda: None)
+    assert len(played.picture()) == 16 + 4 * (81 + 6 * facts["links"] + 27 * (len(facts["quantities"]) - 1))
+
+
 # --- a session --------------------------------------------------------------------------------------------------------
 
 
