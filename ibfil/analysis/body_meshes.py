@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..assembly.fluids.shells import apart
 from .meshes import PLAIN, View, add_array, box_of, known_box
 
 if TYPE_CHECKING:
@@ -34,9 +35,7 @@ def drawn(case: Case, bodies: Columns) -> list[tuple[Mapping[str, Any], tuple[fl
 
 def grain(markers: np.ndarray) -> float:
     """How far a marker (k, 3) is drawn to reach."""
-    apart = np.linalg.norm(markers[:, None] - markers, axis=2)
-    np.fill_diagonal(apart, np.inf)
-    return GRAIN * float(np.median(apart.min(axis=1)))
+    return GRAIN * float(np.median(apart(markers)))
 
 
 def extents(run: RunFile) -> list[np.ndarray]:

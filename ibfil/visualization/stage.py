@@ -134,10 +134,8 @@ class Stage:
 
         if not self._run.links:
             return
-        lines, largest = (
-            pyvista.wrap(link_lines(self._run.snapshot(output), box_of(self._run), self._view)),
-            max(self._strongest, 1e-300),
-        )
+        lines = pyvista.wrap(link_lines(self._run.snapshot(output), box_of(self._run), self._view))
+        largest = max(self._strongest, 1e-300)
         self._show(
             lines,
             scalars="link_force",

@@ -1,7 +1,6 @@
 // A case that is played: the line to `ibfil live`, its pictures, and the hands. draw.js draws.
 let run = null, radius = new Float32Array(0);
 let now = null; // the present: time, steps, places, ends of strokes, values of each quantity
-let scales = []; // of each quantity: [lowest, highest] so far
 let running = true, waiting = false, ended = "";
 const drawnAt = []; // seconds and times of the last pictures
 const line = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/line${location.search}`);
@@ -11,7 +10,8 @@ const send = (order) => { if (line.readyState === WebSocket.OPEN) line.send(JSON
 const position = (node) => [now.places[3 * node], now.places[3 * node + 1], now.places[3 * node + 2]];
 const strokeEnd = (stroke, end) => [0, 1, 2].map((i) => now.ends[6 * stroke + 3 * end + i]);
 function share(node) {
-  const [low, high] = scales[state.quantity], at = (now.values[state.quantity][node] - low) / (high - low);
+  const [low, high] = run.quantities[state.quantity].ends || [0, 0], value = now.values[state.quantity][node];
+  const at = high > low ? (value - low) / (high - low) : 0.5;
   return Math.round(255 * Math.min(1, Math.max(0, Number.isFinite(at) ? at : 0)));
 }
 function backdrop() {}
@@ -30,25 +30,29 @@ function picture(buffer) {
   let at = 3 * nodes + ends;
   const values = own.map((there) => (there ? numbers.subarray(at, (at += nodes)) : null));
   now = { time: head.getFloat64(0, true), steps: head.getFloat64(8, true), places: numbers.subarray(0, 3 * nodes), ends: numbers.subarray(3 * nodes, 3 * nodes + ends), values };
-  values.forEach((each, k) => { if (each) widen(k, each); });
+  values.forEach((each, k) => { if (each) widen(run.quantities[k], each); });
   inSight();
   if (waiting) return;
   waiting = true;
   requestAnimationFrame(() => {
     waiting = false;
-    bar();
     drawSeries();
-    drawnAt.push([performance.now() / 1000, now.time]);
-    rates();
-    send({ drawn: true });
+    if (now !== null) { // else a new scene has begun since, of which no picture has come
+      chosen();
+      drawnAt.push([performance.now() / 1000, now.time]);
+      rates();
+    }
+    send({ drawn: true }); // in any case: the next picture waits for it
   });
 }
 
-function widen(k, values) {
-  let [low, high] = scales[k] || [Infinity, -Infinity];
+function widen(quantity, values) { // its ends: the lowest and the highest of this scene so far
+  let [low, high] = quantity.ends || [Infinity, -Infinity];
   for (const v of values) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
-  if (run.quantities[k].signed) { high = Math.max(Math.abs(low), Math.abs(high)); low = -high; }
-  scales[k] = high > low ? [low, high] : [low - 1e-300, low + 1e-300];
+  if (low > high) return; // none is finite
+  if (quantity.signed) { high = Math.max(Math.abs(low), Math.abs(high)); low = -high; }
+  quantity.ends = [low, high];
+  [quantity.low, quantity.high] = quantity.ends.map((x) => Number(x.toPrecision(3)));
 }
 
 function inSight() { // the rods are followed where that is wanted, and where they have left the picture
@@ -70,21 +74,11 @@ function rates() {
   part("rates").textContent = `${pictures.toFixed(0)} pictures a second, ${words} of the run a second, ${now.steps} steps`;
 }
 
-function bar() {
-  const q = run.quantities[state.quantity], last = q.map.length - 1, ends = scales[state.quantity];
-  if (q.values !== null && !ends) { draw(); return; } // no picture of this scene has come that has a finite value
-  part("bar").style.background = "linear-gradient(to right," + q.map.map((c, k) => "rgb(" + c + ") " + (100 * k) / Math.max(last, 1) + "%").join(",") + ")";
-  part("low").textContent = q.values === null ? q.low : Number(ends[0].toPrecision(3));
-  part("high").textContent = q.values === null ? q.high : Number(ends[1].toPrecision(3));
-  draw();
-}
-
 // --- what is told: all words are set as text, never as markup ---
 function scene(told) {
   const first = run === null, before = run;
   run = { ...told, reach: 1.2 * told.reach }; // room to swim in
   radius = new Float32Array(bytes(run.radius).buffer);
-  scales = run.quantities.map((q) => (q.values === null ? [0, 1] : null));
   drawnAt.length = 0;
   now = null;
   part("title").textContent = run.title;
@@ -139,7 +133,7 @@ part("play").addEventListener("click", play);
 part("again").addEventListener("click", () => { moves(true); send({ again: true, run: true }); });
 part("original").addEventListener("click", () => send({ original: true }));
 part("other").addEventListener("submit", (e) => { e.preventDefault(); send({ key: part("key").value }); });
-part("quantity").addEventListener("change", (e) => { state.quantity = Number(e.target.value); if (now) bar(); });
+part("quantity").addEventListener("change", (e) => { state.quantity = Number(e.target.value); chosen(); });
 for (const id of ["follow", "box"]) part(id).addEventListener("change", () => { if (now) { inSight(); draw(); } });
 part("pace").addEventListener("change", (e) => send({ pace: Number(e.target.value) }));
 part("download").addEventListener("click", () => {

@@ -6,6 +6,7 @@ let found = new Map(); // name -> the element of its number
 let stale = false;
 
 const several = (value) => (Array.isArray(value) ? value : [value]);
+const brief = (x) => (x !== 0 && Math.abs(x) < 1e-3 ? x.toExponential(2) : String(Number(x.toPrecision(3))));
 const shown = (value) => several(value).map((x) => (x === null ? "none yet" : Number(x.toPrecision(4)))).join(", ");
 
 function newSeries(units) {
@@ -63,7 +64,7 @@ function drawSeries() {
     });
     pen.fillStyle = "#666";
     pen.font = "10px system-ui, sans-serif";
-    pen.fillText(Number(most.toPrecision(3)), wide - 55, 10);
-    pen.fillText(Number(low.toPrecision(3)), wide - 55, high - 3);
+    pen.fillText(brief(most), wide - 55, 10);
+    pen.fillText(brief(low), wide - 55, high - 3);
   }
 }

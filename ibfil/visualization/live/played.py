@@ -44,10 +44,10 @@ class Played:
         self._next = 0
         rods = self.simulation.model.rods
         self._rods = {
-            name: rod_of(case, filament, self.simulation.arclength[where])
-            for name, filament, where in zip(rods.names, rods.filaments, rods.nodes, strict=True)
+            rods.names[k]: rod_of(case, rods.filaments[k], self.simulation.arclength[rods.nodes[k]])
+            for k in rods.written(case.output.copies_every)
         }
-        self._quantities = list(dict.fromkeys([colour, *COLOURED, *([FILAMENT] if len(rods.names) > 1 else [])]))
+        self._quantities = list(dict.fromkeys([colour, *COLOURED, *([FILAMENT] if len(self._rods) > 1 else [])]))
 
     @property
     def done(self) -> bool:

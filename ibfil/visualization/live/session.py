@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 PICTURES = 30.0  # a second, at most
 PACE = 25.0  # outputs a second, unless a page asks for another pace
+FASTEST = 1e6  # of a pace
 SUMMED = 0.5  # seconds between two looks at all numbers so far
 IDLE = 0.2  # seconds between two looks at whether it is to end
 
@@ -78,7 +79,7 @@ class Session:
             self._change(self._original, {})
         if isinstance(order.get("key"), str):
             self._change(self._case, [order["key"]])
-        if isinstance(order.get("pace"), (int, float)) and order["pace"] >= 0:
+        if isinstance(order.get("pace"), (int, float)) and 0 <= order["pace"] <= FASTEST:
             self._pace = float(order["pace"])  # 0: as fast as it goes
             self._next_output = 0.0
 
@@ -89,7 +90,7 @@ class Session:
             self._began(Played(case.with_(overrides) if overrides else case, self._colour))
         except CaseError as error:
             self._say(faults=[fault.removeprefix(f"{case.file}: ") for fault in error.faults])
-        except (RunFailed, MemoryError) as error:
+        except (RunFailed, MemoryError, RecursionError) as error:  # the last where a value is nested too deeply
             self._say(faults=str(error).splitlines() or ["not enough memory"])
 
     def _began(self, played: Played) -> None:
