@@ -133,7 +133,7 @@ def test_no_flow_is_made_of_forces_that_are_not_there(tmp_path):
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
-        (["observe.mean={kind='velocity', filament='rod_004', at='centroid'}"], "every 3th, rod_003"),
+        (["observe.mean={kind='velocity', filament='rod_004', at='centroid'}"], "one in 3: rod_003"),
         (["output.copies_every=0"], "output.copies_every"),
     ],
 )

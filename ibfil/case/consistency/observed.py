@@ -40,7 +40,7 @@ def _unwritten(key: str, entry: Observe, case: Scene) -> Iterator[Fault]:
         yield Fault(f"{key}.kind", f"{shown(entry.kind)}, which takes all copies", "output.copies_every = 1", reads)
     one = None if entry.filament in case.filaments else single(case.filaments, entry.filament)
     if one is not None and number_of(entry.filament) % every:
-        allowed = f"a copy that is written: every {every}th, {copy_name(entry.filament.rpartition('_')[0], every)}"
+        allowed = f"a copy that is written, one in {every}: {copy_name(entry.filament.rpartition('_')[0], every)}"
         yield Fault(f"{key}.filament", shown(entry.filament), allowed, reads)
 
 
