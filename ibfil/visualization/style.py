@@ -76,7 +76,8 @@ def plane_of_motion(positions: Sequence[np.ndarray]) -> tuple[int, int]:
 
 
 def save(fig: Figure, path: Path) -> None:
-    """Write a figure as a picture, and beside it as PDF, for papers."""
+    """Write a figure as a picture, and beside it as PDF, for papers; its layout is fixed then."""
     for place in (path, path.with_suffix(".pdf")):
         with replacing(place) as part:
             fig.savefig(part, dpi=170)
+        fig.set_layout_engine("none")  # both have one layout: to find it is a fifth of the time of both

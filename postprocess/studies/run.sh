@@ -45,7 +45,7 @@ study locking stability swimmer_locked time.end=0.6283 time.step=0.0125664 outpu
 study explicit stability swimmer_rft time.end=0.01 output.every=0.002 time.scheme=explicit time.order=1 \
     'observe.speed.over=[0,0.01]' 'observe.sideways.over=[0,0.01]' \
     --vary filament.swimmer.nodes=11,16,21,31,41 --vary time.step=1e-4,3e-5,1e-5,3e-6,1e-6,3e-7
-# Growth that a scheme hides or makes up, foretold from the spectrum: a rod above its flutter, which grows at 4.6.
+# Growth that a scheme hides or makes up, foretold from the spectrum: a rod above its flutter, which grows at 4.48.
 study flailing_stability stability flailing parameters.F0=45 filament.rod.nodes=33 time.end=2.048 output.every=0.032 \
     'observe.growth.over=[0.5,1]' 'observe.frequency.over=[0.5,1]' \
     --vary 'time.scheme=implicit,implicit,semi-implicit&time.order=2,1,1' --vary time.step=0.001,0.002,0.004,0.008,0.016,0.032

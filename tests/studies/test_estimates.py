@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -71,7 +74,7 @@ def test_order_of_any_three_sizes_solves_its_equation():
     for _ in range(50):
         sizes = np.sort(rng.uniform(0.1, 2.0, 3))[::-1] * [1.2, 1.0, 0.8]
         order = rng.uniform(-2.5, 7.0)
-        assert observed_order(power(order, sizes=sizes), sizes) == pytest.approx(order, abs=1e-6)
+        assert observed_order(power(order, sizes=sizes), sizes) == pytest.approx(order, abs=1e-9)
 
 
 def test_errors_add_with_their_signs_and_doubts_as_squares():
@@ -79,3 +82,13 @@ def test_errors_add_with_their_signs_and_doubts_as_squares():
     error, doubt = combined(parts)
     assert error == pytest.approx(-0.1)
     assert doubt == pytest.approx(0.25 * 0.5)
+
+
+def test_the_rule_loads_no_optimizer():
+    """Loading one takes longer than the rule: start-up counts."""
+    code = (
+        "import sys; from ibfil.studies.estimates import observed_order; "
+        "assert abs(observed_order([1.16, 1.04, 1.01], [0.4, 0.2, 0.1]) - 2.0) < 1e-9; "
+        "assert 'scipy.optimize' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -52,7 +52,10 @@ def test_a_command_with_a_wrong_executor_runs_nothing(tmp_path, monkeypatch, cap
     for kind in ("sweep", "stability", "trade"):
         assert main.main([kind, *words]) == 2
         assert "math has no function pie" in capsys.readouterr().err
-    assert main.main(["compare", "bent.toml", "--executor", "math:pie"]) == 2
+    targets = {"fit": ["--vary", "fluid.viscosity=1,2", "--data", "none.csv"], "tune": ["--for", "span=1%"]}
+    for kind in ("compare", "uncertainty", "tune", "fit"):
+        assert main.main([kind, "bent.toml", *targets.get(kind, ()), "--executor", "math:pie"]) == 2
+        assert "math has no function pie" in capsys.readouterr().err
     assert sorted(tmp_path.iterdir()) == [tmp_path / "bent.toml"]
 
 

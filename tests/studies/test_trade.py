@@ -216,3 +216,15 @@ def test_superposing_finds_a_turn_and_what_is_left():
     assert superpose(p, mirrored)[0] > 0.1  # a mirror image is no turn
     line = np.outer(np.linspace(0, 1, 9), [1, 0, 0])
     assert superpose(line, line @ turn)[1] == pytest.approx(angle)
+
+
+@pytest.mark.parametrize(("width", "rolled"), [(0.02, 0.0), (0.2, np.pi)])
+def test_how_a_nearly_straight_rod_is_turned_about_itself_does_not_count(width, rolled):
+    """Two shapes that are mirror images, half a turn about the rod: one that is wider is turned by that."""
+    x = np.linspace(0, 1, 17)
+    left, right = (np.stack([x, side * width * np.sin(np.pi * x), 0 * x], axis=1) for side in (1, -1))
+    distance, angle = superpose(left, right)
+    assert distance < 1e-13
+    assert angle == pytest.approx(rolled, abs=1e-6)
+    turn = np.array([[np.cos(0.3), -np.sin(0.3), 0], [np.sin(0.3), np.cos(0.3), 0], [0, 0, 1]])
+    assert superpose(left @ turn, left)[1] == pytest.approx(0.3)

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.made_run import BENT, make_run
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import ibfil
 from ibfil.case.reading import parse_case
@@ -15,6 +17,7 @@ from ibfil.errors import CaseError
 from ibfil.io.reader import RunFile
 from ibfil.visualization import run_figure, run_series
 from ibfil.visualization.moments import Look, moments
+from ibfil.visualization.style import save
 
 SHOWN = Path(__file__).parents[2] / "postprocess/pictures/swimmer_stokes.png"
 FLAT = 'shape = { kind = "circle", curvature = 1.0 }'
@@ -169,3 +172,16 @@ def test_the_readmes_picture_is_drawn_by_the_present_code(tmp_path):
     now, kept = (np.asarray(Image.open(path).convert("L"), float) for path in (tmp_path / "swimmer.png", SHOWN))
     assert now.shape == kept.shape
     assert np.abs(now - kept).mean() < 1.0  # of 255: other versions of the letters' renderer, not other lines
+
+
+def test_a_figure_is_laid_out_once_for_picture_and_pdf(tmp_path, monkeypatch):
+    laid: list[object] = []
+    real = ConstrainedLayoutEngine.execute
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda self, fig: laid.append(fig) or real(self, fig))
+    fig = Figure(layout="constrained")
+    axes = fig.subplots()
+    axes.set_ylabel("a label\nthat needs room")
+    save(fig, tmp_path / "a.png")
+    assert len(laid) == 1
+    assert axes.get_position().y1 > 0.95  # as by the engine, not 0.88 as without one
+    assert {path.name for path in tmp_path.iterdir()} == {"a.png", "a.pdf"}

@@ -29,18 +29,21 @@ def add(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
     case, changes, folder = begin(arguments, "uncertainty")
+    from ...studies.executors import opened
     from ...studies.uncertainty import files, study
 
-    result = study.uncertainty(
-        case,
-        folder,
-        changes,
-        observe=arguments.observe.split(",") if arguments.observe else (),
-        fine=arguments.fine,
-        meant=arguments.meant,
-        jobs=arguments.jobs,
-        log=tell,
-    )
+    with opened(arguments.executor, arguments.jobs) as pool:
+        result = study.uncertainty(
+            case,
+            folder,
+            changes,
+            observe=arguments.observe.split(",") if arguments.observe else (),
+            fine=arguments.fine,
+            meant=arguments.meant,
+            jobs=arguments.jobs,
+            executor=pool,
+            log=tell,
+        )
     tell("\n".join(lines(result)))
     tell(f"{folder / files.TABLE}, {files.DETAILS}, {files.FIGURE}")
     return DONE
