@@ -23,10 +23,10 @@ WIDE = "t,x0,x1,x2,y0,y1,y2\n0,0,,2,0,0,0\n1,0,1,2,1,1,1\n"
 SIDEWAYS = "\n".join(",".join(column) for column in zip(*(row.split(",") for row in WIDE.split()), strict=True))
 
 
-def data(tmp_path, text, lengths=None, units=("um", "s"), scale=None, rate=None):
+def data(tmp_path, text, lengths=None, units=("um", "s"), scale=None, rate=None, named=()):
     path = tmp_path / "tracked.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read(path, lengths or {"rod": 2.0}, units, scale=scale, rate=rate)
+    return read(path, lengths or {"rod": 2.0}, units, scale=scale, rate=rate, named=named)
 
 
 @pytest.mark.parametrize("text", [*SAME.values(), WIDE, SIDEWAYS], ids=[*SAME, "a row a frame", "a column a frame"])
@@ -40,6 +40,20 @@ def test_tables_that_say_the_same_are_read_the_same(tmp_path, text):
     np.testing.assert_allclose(second.s[order], [0, 1, 2], atol=1e-12)
     np.testing.assert_allclose(second.points[order], [[0, 1], [1, 1], [2, 1]], atol=1e-12)
     assert any("3 of 8 points" in note for note in found.notes) == ("NaN" in text)
+
+
+@pytest.mark.parametrize("own", ["LABEL,POSITION_T,S,POSITION_X,POSITION_Y\n", ""], ids=["others", "none"])
+def test_headings_may_be_given_in_place_of_those_of_a_file(tmp_path, own):
+    """As trackers write them, or without any; UTF-16 as spreadsheets save it."""
+    rows = [f"7,{1000 * t},{s},{s},{y}" for t, s, y in ((0, 0, 0), (0, 2, 0), (1, 0, 1), (1, 1, 1), (1, 2, 1))]
+    text = (own + "\n".join(rows) + "\n").encode("utf-16")
+    found = data(tmp_path, text, named=["", "t_ms", "s", "x", "y"])
+    assert found.times == [0.0, 1.0]
+    np.testing.assert_allclose(found.frames[1].points, [[0, 1], [1, 1], [2, 1]], atol=1e-12)
+    with pytest.raises(CaseError, match="--headings frame,x_um,y_um"):
+        data(tmp_path, text)
+    with pytest.raises(CaseError, match="row 2: found 5 cells; allowed: 3"):
+        data(tmp_path, text, named=["t", "x", "y"])
 
 
 def test_pixels_frames_order_and_filaments(tmp_path):

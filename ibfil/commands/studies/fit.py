@@ -45,6 +45,12 @@ def add(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--scale", type=float, metavar="F", help="lengths in FILE times F are in the case's unit")
     command.add_argument("--rate", type=float, metavar="R", help="frames a unit of the case's time")
+    command.add_argument(
+        "--headings",
+        default="",
+        metavar="NAME,NAME,...",
+        help="what the columns of FILE are, in order (frame,x_um,,y_um), in place of its headings; empty: left alone",
+    )
 
 
 def do(arguments: argparse.Namespace) -> int:
@@ -65,6 +71,7 @@ def do(arguments: argparse.Namespace) -> int:
             align=arguments.align,
             scale=arguments.scale,
             rate=arguments.rate,
+            headings=[name.strip() for name in arguments.headings.split(",")] if arguments.headings else (),
             jobs=arguments.jobs,
             executor=pool,
             log=tell,

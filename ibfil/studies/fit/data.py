@@ -10,13 +10,15 @@ from __future__ import annotations
 import csv
 import math
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import CaseError
-from .headings import FORM, Heading, factor, heading
+from .headings import FORM, OTHERWISE, Heading, factor, heading
 
 MOST = 64 * 2**20  # bytes of a file
 _MISSING = ("", "nan", "na", "null", "none", "-")
@@ -57,13 +59,20 @@ class Data:
 
 
 def read(
-    path: Path, lengths: dict[str, float], units: tuple[str, str], *, scale: float | None, rate: float | None
+    path: Path,
+    lengths: dict[str, float],
+    units: tuple[str, str],
+    *,
+    scale: float | None,
+    rate: float | None,
+    named: Sequence[str] = (),
 ) -> Data:
     """Read the data in ``path`` for filaments of these ``lengths``, in the case's ``units`` of length and time.
 
-    Raises CaseError with one line.
+    ``named`` are headings to be read in place of the file's own, or where it has none; "" leaves a column out. Raises
+    CaseError with one line.
     """
-    headings, rows = _table(path)
+    headings, rows = _table(path, named)
     numbers = _scaled(headings, rows, units, scale, rate)
     if any(one.point is not None for one in headings):
         headings, numbers = _long(headings, numbers)
@@ -74,7 +83,8 @@ def _text(path: Path) -> str:
     try:
         if path.stat().st_size > MOST:
             raise CaseError([f"--data {path}: found {path.stat().st_size >> 20} MiB; allowed: up to {MOST >> 20} MiB"])
-        text = path.read_text(encoding="utf-8-sig")
+        raw = path.read_bytes()
+        text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
     except OSError as error:
         raise CaseError([f"--data {path}: cannot be read ({error.strerror})"]) from None
     except UnicodeDecodeError:
@@ -84,8 +94,8 @@ def _text(path: Path) -> str:
     return text
 
 
-def _table(path: Path) -> tuple[list[Heading], list[list[str]]]:
-    """Headings and rows of cells; a table on its side is turned."""
+def _cells(path: Path, named: Sequence[str]) -> list[list[str]]:
+    """Rows of cells, headings first; a table on its side is turned."""
     text = "\n".join(line for line in _text(path).splitlines() if line.strip() and not line.lstrip().startswith("#"))
     first = text.split("\n", 1)[0]
     mark = next((mark for mark in "\t;," if mark in first), None)
@@ -98,16 +108,26 @@ def _table(path: Path) -> tuple[list[Heading], list[list[str]]]:
     except csv.Error as error:
         raise CaseError([f"--data {path}: found no table ({error}); allowed: {FORM}"]) from None
     rows = [[cell.strip() for cell in row] for row in rows]
+    if named:
+        return [list(named), *rows[0 if rows and all(map(_is_number, rows[0])) else 1 :]]
     if len(rows) > 1 and heading(rows[0][0]) and heading(rows[1][0]):  # headings in the first column
         if len({len(row) for row in rows}) > 1:
             raise CaseError([f"--data {path}: found rows of different lengths; allowed: as many frames in each"])
         rows = [list(column) for column in zip(*rows, strict=True)]
+    return rows
+
+
+def _table(path: Path, named: Sequence[str]) -> tuple[list[Heading], list[list[str]]]:
+    """The headings that are known, and the rows of cells under them."""
+    rows = _cells(path, named)
     names = rows[0] if rows else []
     read = [heading(cell) for cell in names]
     kept = [i for i, one in enumerate(read) if one is not None]
     found = {one.kind for one in read if one is not None}
     if not found & {"t", "frame"} or not (len(found & set("xyz")) > 1 or "psi" in found):
-        raise CaseError([f"--data {path}: found the headings {', '.join(names)[:80] or 'of nothing'}; allowed: {FORM}"])
+        raise CaseError(
+            [f"--data {path}: found the headings {', '.join(names)[:80] or 'of nothing'}; allowed: {FORM}; {OTHERWISE}"]
+        )
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(names):
             raise CaseError(
@@ -135,6 +155,14 @@ def _scaled(
         for i, row in enumerate(rows):
             out[i, j] = _number(row[j], i + 2) * times
     return out
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        _number(cell, 0)
+    except CaseError:
+        return False
+    return True
 
 
 def _number(cell: str, row: int) -> float:

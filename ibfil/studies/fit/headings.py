@@ -19,6 +19,7 @@ FORM = (
     "headings t (or frame), x, y, z (two of them or all; or psi, the tangent's angle), and where there are any s or "
     "node, weight, filament; a unit after a name, x_um or t (ms); or a row a frame, t, x0, y0, x1, y1, ..."
 )
+OTHERWISE = "other files with --headings frame,x_um,y_um: what their columns are, in order, empty for those left alone"
 # In metres, seconds, radians.
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "microns": 1e-6, "nm": 1e-9}
 DURATIONS = {"h": 3600.0, "min": 60.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6}

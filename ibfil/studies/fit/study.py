@@ -81,6 +81,7 @@ def fit(
     align: str = "none",
     scale: float | None = None,
     rate: float | None = None,
+    headings: Sequence[str] = (),
     jobs: int = 1,
     executor: Executor | None = None,
     log: Callable[[str], object] = tell,
@@ -90,7 +91,7 @@ def fit(
     ``data`` is a table of tracked points (data.py), ``observe`` observables of the case as (value, standard error);
     ``error`` that of points, needed where both are given. ``align``: none, start (the rigid motion of the first
     frame is taken out) or each (of every frame). ``scale`` times lengths and 1/``rate`` times frame numbers or times
-    are in case units. The search begins at the case's own values, so ``overrides`` move it. Writes fit.csv, fit.json,
+    are in case units; ``headings`` stand for those of the file. The search begins at the case's own values, so ``overrides`` move it. Writes fit.csv, fit.json,
     fit.png.
 
     Raises CaseError; RunFailed where the run fails at the start or beside the best place; Interrupted: the same call
@@ -102,7 +103,7 @@ def fit(
     base = Member("case", whole, changes).resolved()
     _refuse(base, data, observe, error, align, scale, rate)
     parameters, start = _parameters(base, vary)
-    tracked = None if data is None else _read(base, Path(data), scale, rate)
+    tracked = None if data is None else _read(base, Path(data), scale, rate, headings)
     target = _Target(tracked, align, observe or {}, error or 1.0)
     if tracked is not None:
         changes += _at_times(base, tracked.times, bool(observe))
@@ -187,10 +188,10 @@ def _own(raw: Any, key: str) -> float | None:
     return None
 
 
-def _read(case: Case, path: Path, scale: float | None, rate: float | None) -> Data:
+def _read(case: Case, path: Path, scale: float | None, rate: float | None, headings: Sequence[str]) -> Data:
     lengths = {name: float(one.length) for name, one in case.filaments.items()}
     units = (label(case.units, "length"), label(case.units, "time"))
-    data = read(path, lengths, units, scale=scale, rate=rate)
+    data = read(path, lengths, units, scale=scale, rate=rate, named=headings)
     first, last, end = data.frames[0].time, data.frames[-1].time, float(case.time.end)
     if first < 0 or last > end * (1 + _SHORTEST):
         wrong = first if first < 0 else last
