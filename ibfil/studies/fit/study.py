@@ -91,8 +91,8 @@ def fit(
     ``data`` is a table of tracked points (data.py), ``observe`` observables of the case as (value, standard error);
     ``error`` that of points, needed where both are given. ``align``: none, start (the rigid motion of the first
     frame is taken out) or each (of every frame). ``scale`` times lengths and 1/``rate`` times frame numbers or times
-    are in case units; ``headings`` stand for those of the file. The search begins at the case's own values, so ``overrides`` move it. Writes fit.csv, fit.json,
-    fit.png.
+    are in case units; ``headings`` stand for those of the file. The search begins at the case's own values, so
+    ``overrides`` move it. Writes fit.csv, fit.json, fit.png.
 
     Raises CaseError; RunFailed where the run fails at the start or beside the best place; Interrupted: the same call
     goes on.
